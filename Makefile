@@ -1,0 +1,111 @@
+# From a fresh Debian 12 with git, Python 3.11, g++ and make. `make help` lists the targets.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+# Warnings are errors in CI only.
+WERROR := $(if $(CI),ON,OFF)
+
+BUILD_PACKAGES := cmake g++ libceres-dev libeigen3-dev libopencv-dev libyaml-cpp-dev make \
+    ninja-build python3-dev python3-venv
+TEST_PACKAGES := clang-format libgtest-dev
+
+CPP_FILES = $(shell find cpp tests/cpp -name '*.cpp' -o -name '*.hpp')
+# What the wheel is made of: it is built again when one of these changes.
+WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
+    $(shell find cpp python -type f -not -path '*/__pycache__/*')
+
+.PHONY: help demo test lint test-cpp test-sdist test-python sanitize format stub bench clean
+help:
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
+
+demo: $(VENV)/.installed ## render a rig, calibrate it, register it: pictures in build/demo
+	$(BIN)/xcalib demo -o build/demo
+
+test: lint test-cpp test-sdist test-python ## every check and test, C++ and Python
+
+# -- What the machine needs -----------------------------------------------------------------------
+
+.PHONY: build-packages test-packages
+build-packages:
+	@scripts/install_packages.sh $(BUILD_PACKAGES)
+test-packages: | build-packages
+	@scripts/install_packages.sh $(TEST_PACKAGES)
+
+# -- The environment, and the package in it -------------------------------------------------------
+
+# $(call requirements,key,key): a list of requirements in pyproject.toml.
+comma := ,
+requirements = $(BIN)/python -c 'import sys, tomllib, functools; print(*functools.reduce(dict.get, \
+    sys.argv[1:], tomllib.load(open("pyproject.toml", "rb"))), sep="\n")' $(subst $(comma), ,$(1))
+
+$(VENV)/.created: | build-packages
+	$(PYTHON) -m venv --clear $(VENV)
+	touch $@
+
+$(VENV)/.build-requires: pyproject.toml $(VENV)/.created
+	$(PIP) install -q -r <($(call requirements,build-system requires))
+	touch $@
+
+$(VENV)/.test-requires: pyproject.toml $(VENV)/.build-requires
+	$(PIP) install -q -r <($(call requirements,project optional-dependencies test))
+	touch $@
+
+# Without build isolation, so that CMake finds the same pybind11 again and builds what changed only.
+$(VENV)/.installed: $(WHEEL_FILES) $(VENV)/.build-requires
+	$(PIP) install -q --no-build-isolation --config-settings=build-dir=build/wheel \
+	    --config-settings=cmake.define.XCALIB_WERROR=$(WERROR) .
+	touch $@
+
+# -- Checks ---------------------------------------------------------------------------------------
+
+lint: $(VENV)/.installed $(VENV)/.test-requires | test-packages ## formatting, lint and types
+	clang-format --dry-run --Werror $(CPP_FILES)
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	$(BIN)/mypy
+
+test-cpp: | test-packages ## C++ tests
+	cmake -S . -B build/tests -G Ninja -DXCALIB_TESTS=ON -DXCALIB_WERROR=$(WERROR)
+	cmake --build build/tests
+	ctest --test-dir build/tests --output-on-failure
+
+sanitize: | test-packages ## C++ tests under the address and undefined-behaviour sanitizers
+	cmake -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DXCALIB_TESTS=ON \
+	    -DXCALIB_SANITIZE=ON -DXCALIB_WERROR=$(WERROR)
+	cmake --build build/sanitize
+	ctest --test-dir build/sanitize --output-on-failure
+
+test-sdist: build/sdist/.tested ## an sdist builds, and installs from source
+build/sdist/.tested: $(WHEEL_FILES) $(VENV)/.test-requires | $(VENV)/.installed
+	rm -rf build/sdist
+	$(BIN)/python -m build --sdist --no-isolation --outdir build/sdist .
+	$(PIP) install -q --no-build-isolation --no-deps --target build/sdist/site build/sdist/*.tar.gz
+	cd build/sdist/site && ../../../$(BIN)/python -c \
+	    'import pathlib, xcalib; assert pathlib.Path(xcalib.__file__).is_relative_to(pathlib.Path.cwd())'
+	touch $@
+
+# From the tests' folder: the package they import is the installed one.
+test-python: $(VENV)/.installed $(VENV)/.test-requires ## Python tests, on the installed package
+	cd tests && ../$(BIN)/python -m pytest
+
+bench: $(VENV)/.installed $(VENV)/.test-requires ## the published figures
+	$(BIN)/python bench/run.py
+
+format: $(VENV)/.test-requires | test-packages ## rewrite the code in its style
+	clang-format -i $(CPP_FILES)
+	$(BIN)/ruff check --fix --exit-zero
+	$(BIN)/ruff format
+
+stub: $(VENV)/.test-requires $(VENV)/.installed ## copy the docstrings of the C++ module into its stub
+	$(BIN)/python scripts/fill_stub.py python/xcalib/_core.pyi
+	$(BIN)/ruff format python/xcalib/_core.pyi
+
+clean: ## remove what the targets above made
+	rm -rf build dist $(VENV)

@@ -1,0 +1,113 @@
+// Calibration: frames and depth in, one rig and a report out.
+//
+//     frames -> working images -> search -> pyramid (stage 1, stage 2) -> rig, verdict
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "xcalib/camera.hpp"
+#include "xcalib/image.hpp"
+
+namespace xcalib {
+
+enum class SearchMode {
+    automatic,  // full without an initial rig, local with one
+    full,       // any displacement, ratio of fields of view and roll below
+    local,      // around the initial rig: 15 % of its width, 15 % of its scale, 3 deg of roll
+    off,        // start at the initial rig, or at the paper's 45 deg where there is none
+};
+
+struct SearchOptions {
+    SearchMode mode = SearchMode::automatic;
+    double max_fov_ratio = 2.5;   // of the tangents, either way, (1, 10]
+    double max_roll_deg = 6.0;    // [deg], >= 0
+    double min_overlap = 0.3;     // (0, 1): geometric mean of the shares of both images' edges
+    int map_width = 96;           // [px], >= 32
+    int candidates = 16;          // peaks considered, >= 1
+};
+
+struct CalibrationOptions {
+    int max_frames = 32;      // pairs used, spread over the footage, >= 1
+    std::uint32_t seed = 0;   // of the frame choice
+    int num_threads = 0;      // 0: every core
+    int working_width = 640;  // [px]: references are reduced by a whole factor to at most this
+    int max_iterations = 30;  // per stage and level, >= 1
+    double prior_weight = 1.0;  // gamma of Eq. (total_loss), stage 1 only, >= 0
+
+    // Known intrinsics are taken as they are and frozen.
+    std::optional<Pinhole> reference_camera;
+    std::optional<Pinhole> source_camera;
+    // Start of the reference's horizontal field of view; searched where neither is given. (0, 180)
+    std::optional<double> reference_hfov_deg;
+    // The reference's intrinsics and the source's are coupled (a gauge): free only on request.
+    bool optimize_reference = false;
+
+    SearchOptions search;
+
+    void validate() const;  // throws std::invalid_argument: field, value, range
+};
+
+struct LevelReport {
+    int factor = 1;  // of the reduction of the working images
+    int stage = 1;   // of the paper: 1 with its frozen set and prior, 2 with all free
+    int width = 0, height = 0;
+    int iterations = 0;
+    double initial_cost = 0.0, final_cost = 0.0;  // Eq. (image_loss), plus the prior in stage 1
+    double nec = 0.0;          // mean over the pairs, weighted by c_i
+    double valid_share = 0.0;  // of the reference's edge energy that the source covers
+    double condition_number = 0.0;  // of the normal equations, columns scaled to unit norm
+    double seconds = 0.0;
+    std::string stopped;  // why
+};
+
+struct CandidateReport {
+    double score = 0.0, correlation = 0.0, overlap = 0.0;  // as the search found it
+    double refined_nec = 0.0;  // after refinement at the coarse level
+    Rig found;    // by the search
+    Rig refined;  // after refinement at the coarse level
+};
+
+struct CalibrationReport {
+    bool converged = false;
+    std::string message;      // one line: why the result is, or is not, to be trusted
+    double seconds = 0.0;
+    double search_seconds = 0.0;
+    int working_width = 0, working_height = 0;
+    double nec = 0.0;          // at the finest level
+    double baseline_nec = 0.0; // there, typical of rigs displaced by many pixels
+    double valid_share = 0.0;
+    std::vector<int> frames;   // indices of the pairs used
+    std::vector<CandidateReport> candidates;
+    std::vector<LevelReport> levels;
+
+    std::string brief() const;  // one line
+    std::string full() const;   // a table
+};
+
+struct CalibrationResult {
+    Rig rig;
+    bool converged = false;
+    CalibrationReport report;
+};
+
+// Called with the stage and the share of all work done, (0, 1], from the calling thread.
+using Progress = std::function<void(const std::string&, double)>;
+
+// `max_frames` of `count` indices, spread over the whole, drawn with `seed`; sorted.
+std::vector<int> choose_frames(int count, int max_frames, std::uint32_t seed);
+
+// references[i], sources[i], depths[i] belong together; each list of one size (depth: any size of
+// the reference's aspect, float32 metres in the reference camera, 0 / NaN / inf unknown).
+// Throws std::invalid_argument, naming the frame, on unusable input. Not to converge is a result.
+CalibrationResult calibrate(const std::vector<ImageView>& references,
+                            const std::vector<ImageView>& sources,
+                            const std::vector<ImageView>& depths,
+                            const std::optional<Rig>& initial = std::nullopt,
+                            const CalibrationOptions& options = {},
+                            const Progress& progress = nullptr);
+
+}  // namespace xcalib

@@ -1,0 +1,106 @@
+// Cameras and rigs: the parameters that a calibration estimates.
+//
+// Conventions: pixel centres at integer coordinates, x right, y down, camera z forward; lengths in
+// metres, angles in radians unless a name says otherwise. A transform `b_from_a` takes points of
+// frame a to frame b.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace xcalib {
+
+// A pinhole camera, Eq. (intrinsic): u = fx X/Z + skew Y/Z + cx, v = fy Y/Z + cy.
+struct Pinhole {
+    int width = 0;      // [px]
+    int height = 0;     // [px]
+    double fx = 0.0;    // [px], > 0
+    double fy = 0.0;    // [px], > 0
+    double cx = 0.0;    // [px]
+    double cy = 0.0;    // [px]
+    double skew = 0.0;  // [px]
+
+    // Square pixels, principal point at the image centre. hfov in (0, pi).
+    static Pinhole from_hfov(int width, int height, double hfov);
+
+    Eigen::Matrix3d K() const;
+    double hfov() const;  // 2 atan(width / (2 fx))
+    double vfov() const;
+
+    // The same camera seen through an image of another size: x -> f x + (f - 1) / 2.
+    Pinhole resized(int new_width, int new_height) const;
+
+    // Throws std::invalid_argument naming `name`, the field, its value and what was expected.
+    void validate(const char* name) const;
+};
+
+struct Pose {
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // unit
+    Eigen::Vector3d translation = Eigen::Vector3d::Zero();         // [m]
+};
+
+// Two cameras fixed to each other. The reference gives the pixel grid, the source is warped to it.
+struct Rig {
+    Pinhole reference;
+    Pinhole source;
+    Pose source_from_reference;
+
+    Eigen::Matrix3d R() const { return source_from_reference.rotation.toRotationMatrix(); }
+    const Eigen::Vector3d& t() const { return source_from_reference.translation; }
+
+    Rig resized(int reference_width, int reference_height, int source_width,
+                int source_height) const;
+    void validate() const;
+};
+
+// Eq. (unprojection): the point at depth `z` behind pixel (u, v).
+Eigen::Vector3d unproject(const Pinhole& camera, double u, double v, double z);
+
+// Eq. (perspective_projection). `x_in_camera` must lie in front of the camera (z > 0).
+Eigen::Vector2d project(const Pinhole& camera, const Eigen::Vector3d& x_in_camera);
+
+// Eq. (infinite_homography): K_S R K_R^-1, where pixels at infinite depth go.
+Eigen::Matrix3d infinite_homography(const Rig& rig);
+
+// The paper's parameterization: unconstrained numbers that are 1 or 0 or 1/2 at its start.
+struct PaperParameters {
+    struct Camera {
+        double fx = 1.0;    // Eq. (focal_lengths)
+        double fy = 1.0;    // Eq. (focal_lengths)
+        double cx = 0.5;    // of the width, from the left edge of the first pixel
+        double cy = 0.5;    // of the height
+        double skew = 0.0;  // [px]
+    };
+    Camera reference;
+    Camera source;
+    Eigen::Vector4d quaternion = Eigen::Vector4d(1, 0, 0, 0);  // w x y z, any norm but 0
+    Eigen::Vector3d t_fine = Eigen::Vector3d::Zero();          // Eq. (translation), [m]
+    Eigen::Vector3d t_coarse = Eigen::Vector3d::Zero();        // Eq. (translation), [lambda_t m]
+};
+
+inline constexpr double kPaperTranslationScale = 10.0;  // lambda_t
+
+Rig rig_from_paper(const PaperParameters& parameters, int reference_width, int reference_height,
+                   int source_width, int source_height);
+// The translation goes to the fine component whole: the split is not unique.
+PaperParameters paper_from_rig(const Rig& rig);
+
+// The solver's parameterization: every number is dimensionless or in metres, of order one, and the
+// same at every pyramid level.
+struct SolverParameters {
+    struct Camera {
+        double log_f[2];  // log(fx / width), log(fy / height)
+        double center[2];  // (cx + 1/2) / width, (cy + 1/2) / height
+        double skew[1];    // skew / width
+    };
+    Camera reference;
+    Camera source;
+    double quaternion[4];   // w x y z, unit
+    double translation[3];  // [m]
+};
+
+SolverParameters solver_from_rig(const Rig& rig);
+Rig rig_from_solver(const SolverParameters& parameters, int reference_width, int reference_height,
+                    int source_width, int source_height);
+
+}  // namespace xcalib

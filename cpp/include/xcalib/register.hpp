@@ -1,0 +1,38 @@
+// Registrar: one rig, a stream of frames. No solver, no search, no Ceres.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "xcalib/camera.hpp"
+#include "xcalib/image.hpp"
+#include "xcalib/warp.hpp"
+
+namespace xcalib {
+
+class Registrar {
+   public:
+    // num_threads: 0 uses every core. Throws std::invalid_argument where the rig is not valid.
+    explicit Registrar(const Rig& rig, int num_threads = 0);
+
+    const Rig& rig() const { return rig_; }
+
+    // Source coordinates of each reference pixel, (height x width x 2) floats [px], x then y; NaN
+    // where there is none. `depth`: one float32 channel [m], any size of the reference's aspect.
+    void map(const ImageView& depth, float* out) const;
+
+    // Samples `source` on the reference grid. `registered` has the source's type and channels and
+    // the reference's size; `mask` takes width * height Validity codes. Pixels that are not valid
+    // are 0. Throws std::invalid_argument where a size or type does not fit.
+    void register_frame(const ImageView& source, const ImageView& depth,
+                        const MutableImageView& registered, std::uint8_t* mask) const;
+
+   private:
+    Image on_reference_grid(const ImageView& depth) const;
+
+    Rig rig_;
+    Reprojection reprojection_;
+    int num_threads_;
+};
+
+}  // namespace xcalib

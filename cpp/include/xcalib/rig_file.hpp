@@ -1,0 +1,18 @@
+// The rig file: YAML, one reader and one writer for Python and C++.
+#pragma once
+
+#include <string>
+
+#include "xcalib/camera.hpp"
+
+namespace xcalib {
+
+// Throws std::system_error where the file cannot be read, std::invalid_argument, naming the file,
+// the field, its value and what was expected, where it is not a rig.
+Rig load_rig(const std::string& path);
+
+// The file appears whole or not at all: written beside, then renamed. Numbers are written with the
+// digits that read back as the same double. Throws std::system_error where it cannot be written.
+void save_rig(const Rig& rig, const std::string& path);
+
+}  // namespace xcalib

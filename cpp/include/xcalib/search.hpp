@@ -1,0 +1,46 @@
+// The global search that starts a calibration: no initial guess is needed.
+//
+// With the doubled angle, z = a exp(2 i theta), the polarity drops out, and Re sum conj(z_R) z_S =
+// sum a b cos 2d is one correlation: its Fourier product gives every displacement at once. It is
+// Eq. (nec) with 2 cos^2 d - 1 in place of |cos d|, which is zero on average where edges meet by
+// chance, and so stands out more. Both images are first drawn on a Mercator map of viewing
+// directions, where a rotation of the camera is, near the horizon, a translation whatever the field
+// of view; focal lengths and roll are looped over, and the frames of the rig pooled.
+#pragma once
+
+#include <vector>
+
+#include "xcalib/camera.hpp"
+#include "xcalib/image.hpp"
+
+namespace xcalib {
+
+// A reference camera to try, and the source cameras to try with it.
+struct SearchHypothesis {
+    Pinhole reference;
+    std::vector<Pinhole> sources;
+};
+
+struct SearchSpace {
+    std::vector<SearchHypothesis> hypotheses;
+    std::vector<double> rolls;                           // [rad]
+    Eigen::Matrix3d base = Eigen::Matrix3d::Identity();  // rotation that the search is centred on
+    double max_shift = 0.0;    // of the reference's width on the map; 0: any
+    double min_overlap = 0.3;  // geometric mean of the shares of both images' edges
+    int map_width = 96;        // [px] of the reference
+    int candidates = 8;        // returned at most
+};
+
+struct SearchCandidate {
+    Rig rig;              // zero translation
+    double score = 0.0;   // correlation above the typical at this scale, times sqrt(overlap)
+    double correlation = 0.0;  // pooled, of doubled angles, in [-1, 1]
+    double overlap = 0.0;
+};
+
+// `references` and `sources`: gray, one size each, as many of the one as of the other. Best first.
+std::vector<SearchCandidate> global_search(const std::vector<Image>& references,
+                                           const std::vector<Image>& sources,
+                                           const SearchSpace& space, int num_threads);
+
+}  // namespace xcalib

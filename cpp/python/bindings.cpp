@@ -1,0 +1,554 @@
+// The Python module: it converts and calls, nothing else.
+#include <pybind11/eigen.h>
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <system_error>
+
+#include "xcalib/calibrate.hpp"
+#include "xcalib/metrics.hpp"
+#include "xcalib/nec.hpp"
+#include "xcalib/register.hpp"
+#include "xcalib/rig_file.hpp"
+
+namespace py = pybind11;
+using namespace xcalib;
+
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+std::string shape_text(const py::array& array) {
+    std::string text = "shape (";
+    for (py::ssize_t i = 0; i < array.ndim(); ++i)
+        text += (i ? ", " : "") + std::to_string(array.shape(i));
+    return text + ") " + std::string(py::str(array.dtype()));
+}
+
+// A view on a numpy array, and the array that owns it (a copy where rows are not contiguous).
+struct Held {
+    py::array array;
+    ImageView view;
+};
+
+Held image_of(const std::string& name, const py::object& object) {
+    const py::array given = py::array::ensure(object);
+    if (!given) throw py::value_error(name + " is not a numpy array");
+    PixelType type;
+    if (py::isinstance<py::array_t<std::uint8_t>>(given)) type = PixelType::u8;
+    else if (py::isinstance<py::array_t<std::uint16_t>>(given)) type = PixelType::u16;
+    else if (py::isinstance<py::array_t<float>>(given)) type = PixelType::f32;
+    else throw py::value_error(name + " has " + shape_text(given) +
+                               ", expected dtype uint8, uint16 or float32");
+    const bool gray = given.ndim() == 2 || (given.ndim() == 3 && given.shape(2) == 1);
+    if (!gray && !(given.ndim() == 3 && given.shape(2) == 3))
+        throw py::value_error(name + " has " + shape_text(given) +
+                              ", expected shape (H, W) or (H, W, 3)");
+    if (given.size() == 0) throw py::value_error(name + " has " + shape_text(given) + ", is empty");
+    Held held;
+    held.array = py::array::ensure(given, py::array::c_style);
+    held.view = {held.array.data(), static_cast<int>(held.array.shape(1)),
+                 static_cast<int>(held.array.shape(0)), gray ? 1 : 3, type,
+                 static_cast<std::ptrdiff_t>(held.array.shape(1) * (gray ? 1 : 3) *
+                                             held.array.itemsize())};
+    return held;
+}
+
+// Depth in metres: float32; float64 is converted. Integers are refused, they carry no unit.
+Held depth_of(const std::string& name, const py::object& object) {
+    py::array given = py::array::ensure(object);
+    if (!given) throw py::value_error(name + " is not a numpy array");
+    if (py::isinstance<py::array_t<double>>(given)) given = py::array_t<float>::ensure(given);
+    if (!py::isinstance<py::array_t<float>>(given) || given.ndim() != 2 || given.size() == 0)
+        throw py::value_error(name + " has " + shape_text(given) +
+                              ", expected shape (h, w) float32 in metres");
+    return image_of(name, given);
+}
+
+struct HeldList {
+    std::vector<Held> held;
+    std::vector<ImageView> views;
+};
+
+template <class Convert>
+HeldList list_of(const char* name, const py::sequence& sequence, const Convert& convert) {
+    HeldList list;
+    for (std::size_t i = 0; i < sequence.size(); ++i) {
+        list.held.push_back(
+            convert(std::string(name) + " frame " + std::to_string(i), sequence[i]));
+        list.views.push_back(list.held.back().view);
+    }
+    return list;
+}
+
+Image gray_of(const char* name, const py::object& object) { return to_gray(image_of(name, object).view); }
+
+// Two images of one size as gray, and the mask over them.
+struct Compared {
+    Image reference, registered;
+    py::array_t<std::uint8_t> mask;
+    const std::uint8_t* valid = nullptr;
+};
+
+Compared compared(const py::object& reference, const py::object& registered,
+                  const py::object& mask) {
+    Compared out;
+    out.reference = gray_of("reference", reference);
+    out.registered = gray_of("registered", registered);
+    const auto size = [](const Image& image) {
+        return std::to_string(image.width) + "x" + std::to_string(image.height);
+    };
+    if (out.reference.width != out.registered.width ||
+        out.reference.height != out.registered.height)
+        throw py::value_error("registered is " + size(out.registered) +
+                              ", expected the reference's " + size(out.reference));
+    if (!mask.is_none()) {
+        const py::array given = py::array::ensure(mask);
+        if (!given || given.ndim() != 2 || given.shape(0) != out.reference.height ||
+            given.shape(1) != out.reference.width)
+            throw py::value_error("mask has " + (given ? shape_text(given) : "no shape") +
+                                  ", expected the images' " + size(out.reference));
+        out.mask = py::module_::import("numpy").attr("not_equal")(given, 0)
+                       .attr("astype")("uint8");
+        out.valid = out.mask.data();
+    }
+    return out;
+}
+
+double range_of(const py::object& object, const py::object& data_range) {
+    // Integers reach [0, 1] in gray images; float32 images are taken to lie there.
+    (void)object;
+    if (data_range.is_none()) return 1.0;
+    const double value = data_range.cast<double>();
+    if (!(value > 0)) throw py::value_error("data_range is " + std::to_string(value) + ", expected > 0");
+    return value;
+}
+
+Rig make_rig(const Pinhole& reference, const Pinhole& source, const py::object& R,
+             const py::object& t) {
+    Rig rig;
+    rig.reference = reference;
+    rig.source = source;
+    if (!R.is_none()) {
+        const auto matrix = R.cast<Eigen::Matrix3d>();
+        if (!((matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6 &&
+              matrix.determinant() > 0))
+            throw py::value_error("R is not a rotation matrix (R R^T = I, det R = 1 within 1e-6)");
+        rig.source_from_reference.rotation = Eigen::Quaterniond(matrix).normalized();
+    }
+    if (!t.is_none()) rig.source_from_reference.translation = t.cast<Eigen::Vector3d>();
+    rig.validate();
+    return rig;
+}
+
+std::string text_of(const Pinhole& c) {
+    std::ostringstream out;
+    out << "Pinhole(width=" << c.width << ", height=" << c.height << ", fx=" << c.fx
+        << ", fy=" << c.fy << ", cx=" << c.cx << ", cy=" << c.cy << ", skew=" << c.skew << ")";
+    return out.str();
+}
+
+const char* name_of(SearchMode mode) {
+    switch (mode) {
+        case SearchMode::automatic: return "auto";
+        case SearchMode::full: return "full";
+        case SearchMode::local: return "local";
+        case SearchMode::off: return "off";
+    }
+    return "";
+}
+
+SearchMode mode_of(const std::string& name) {
+    for (SearchMode mode :
+         {SearchMode::automatic, SearchMode::full, SearchMode::local, SearchMode::off})
+        if (name == name_of(mode)) return mode;
+    throw py::value_error("search mode is '" + name + "', expected auto, full, local or off");
+}
+
+// Sets the fields that keyword arguments name; an unknown one is an error.
+template <class Options>
+Options options_from(const py::kwargs& fields) {
+    const py::object object = py::cast(Options{});
+    for (const auto& [name, value] : fields) {
+        if (!py::hasattr(object, name))
+            throw py::type_error("unknown option '" + std::string(py::str(name)) + "'");
+        py::setattr(object, name, value);
+    }
+    return object.cast<Options>();
+}
+
+py::dict dict_of(const CalibrationReport& report) {
+    py::list candidates, levels;
+    for (const CandidateReport& c : report.candidates)
+        candidates.append(py::dict(
+            py::arg("score") = c.score, py::arg("correlation") = c.correlation, py::arg("overlap") = c.overlap,
+            py::arg("refined_nec") = c.refined_nec,
+            py::arg("reference_hfov_deg") = c.refined.reference.hfov() / kDegree,
+            py::arg("source_hfov_deg") = c.refined.source.hfov() / kDegree));
+    for (const LevelReport& l : report.levels)
+        levels.append(py::dict(
+            py::arg("factor") = l.factor, py::arg("stage") = l.stage, py::arg("width") = l.width,
+            py::arg("height") = l.height, py::arg("iterations") = l.iterations,
+            py::arg("initial_cost") = l.initial_cost, py::arg("final_cost") = l.final_cost,
+            py::arg("nec") = l.nec, py::arg("valid_share") = l.valid_share,
+            py::arg("condition_number") = l.condition_number, py::arg("seconds") = l.seconds,
+            py::arg("stopped") = l.stopped));
+    return py::dict(
+        py::arg("converged") = report.converged, py::arg("message") = report.message,
+        py::arg("seconds") = report.seconds, py::arg("search_seconds") = report.search_seconds,
+        py::arg("working_width") = report.working_width,
+        py::arg("working_height") = report.working_height, py::arg("nec") = report.nec,
+        py::arg("baseline_nec") = report.baseline_nec,
+        py::arg("valid_share") = report.valid_share, py::arg("frames") = report.frames,
+        py::arg("candidates") = candidates, py::arg("levels") = levels);
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_core, m) {
+    m.doc() = "XCalib's C++ core. Import it as `xcalib`.";
+
+    py::register_exception_translator([](std::exception_ptr p) {
+        try {
+            if (p) std::rethrow_exception(p);
+        } catch (const std::system_error& error) {
+            errno = error.code().value();
+            // what() begins with the path: "path: reason".
+            const std::string what = error.what();
+            const std::string path = what.substr(0, what.rfind(": "));
+            PyErr_SetFromErrnoWithFilename(PyExc_OSError, path.c_str());
+        }
+    });
+
+    py::class_<Pinhole>(m, "Pinhole", R"(A pinhole camera, Eq. (intrinsic) of the paper.
+
+Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.)")
+        .def(py::init([](int width, int height, double fx, double fy, double cx, double cy,
+                         double skew) {
+                 const Pinhole camera{width, height, fx, fy, cx, cy, skew};
+                 camera.validate("Pinhole");
+                 return camera;
+             }),
+             py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
+             py::arg("cy"), py::arg("skew") = 0.0,
+             "Raises ValueError where a size is below 1, a focal length not > 0, or a value not finite.")
+        .def_static(
+            "from_hfov",
+            [](int width, int height, double hfov_deg) {
+                return Pinhole::from_hfov(width, height, hfov_deg * kDegree);
+            },
+            py::arg("width"), py::arg("height"), py::arg("hfov_deg"),
+            "Square pixels and the principal point at the centre; hfov_deg in (0, 180).")
+        .def_readwrite("width", &Pinhole::width, "[px]")
+        .def_readwrite("height", &Pinhole::height, "[px]")
+        .def_readwrite("fx", &Pinhole::fx, "[px]")
+        .def_readwrite("fy", &Pinhole::fy, "[px]")
+        .def_readwrite("cx", &Pinhole::cx, "[px]")
+        .def_readwrite("cy", &Pinhole::cy, "[px]")
+        .def_readwrite("skew", &Pinhole::skew, "[px]")
+        .def_property_readonly("K", &Pinhole::K, "(3, 3) float64 intrinsic matrix [px].")
+        .def_property_readonly(
+            "hfov_deg", [](const Pinhole& c) { return c.hfov() / kDegree; },
+            "Horizontal field of view, 2 atan(width / (2 fx)) [deg].")
+        .def_property_readonly(
+            "vfov_deg", [](const Pinhole& c) { return c.vfov() / kDegree; },
+            "Vertical field of view [deg].")
+        .def("resized", &Pinhole::resized, py::arg("width"), py::arg("height"),
+             "The same camera behind an image of another size [px].")
+        .def("__repr__", &text_of);
+
+    py::class_<Rig>(m, "Rig", R"(A reference and a source camera, fixed to each other.
+
+`R` and `t` take points of the reference camera to the source camera: X_S = R X_R + t.)")
+        .def(py::init(&make_rig), py::arg("reference"), py::arg("source"),
+             py::arg("R") = py::none(), py::arg("t") = py::none(),
+             "R: (3, 3) rotation, default identity. t: (3,) [m], default zero. ValueError otherwise.")
+        .def_readwrite("reference", &Rig::reference, "Pinhole that gives the pixel grid.")
+        .def_readwrite("source", &Rig::source, "Pinhole whose images are registered.")
+        .def_property(
+            "R", &Rig::R,
+            [](Rig& rig, const Eigen::Matrix3d& R) {
+                rig = make_rig(rig.reference, rig.source, py::cast(R), py::cast(rig.t()));
+            },
+            "(3, 3) float64 rotation, source_from_reference.")
+        .def_property(
+            "t", [](const Rig& rig) { return rig.t(); },
+            [](Rig& rig, const Eigen::Vector3d& t) {
+                rig = make_rig(rig.reference, rig.source, py::cast(rig.R()), py::cast(t));
+            },
+            "(3,) float64 translation, source_from_reference [m].")
+        .def_property_readonly(
+            "quaternion_wxyz",
+            [](const Rig& rig) {
+                const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
+                return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
+            },
+            "(4,) float64 unit quaternion of R.")
+        .def_property_readonly("infinite_homography", &infinite_homography,
+                               "(3, 3) float64, K_S R K_R^-1: where points at infinity go.")
+        .def("resized", &Rig::resized, py::arg("reference_width"), py::arg("reference_height"),
+             py::arg("source_width"), py::arg("source_height"),
+             "The same rig behind images of other sizes [px].")
+        .def("save", [](const Rig& rig, const std::filesystem::path& path) { save_rig(rig, path.string()); },
+             py::arg("path"), "Writes the rig file, whole or not at all. OSError names the path.")
+        .def_static(
+            "load", [](const std::filesystem::path& path) { return load_rig(path.string()); },
+            py::arg("path"),
+            "Reads a rig file. OSError where it cannot be read; ValueError, with the path, the field "
+            "and what was expected, where it is not a rig.")
+        .def("__repr__", [](const Rig& rig) {
+            std::ostringstream out;
+            out << "Rig(reference=" << text_of(rig.reference) << ", source=" << text_of(rig.source)
+                << ", t=[" << rig.t().transpose() << "])";
+            return out.str();
+        });
+
+    py::class_<SearchOptions>(m, "SearchOptions", "The global search that starts a calibration.")
+        .def(py::init(&options_from<SearchOptions>))
+        .def_property(
+            "mode", [](const SearchOptions& o) { return name_of(o.mode); },
+            [](SearchOptions& o, const std::string& name) { o.mode = mode_of(name); },
+            "auto (full without an initial rig, local with one), full, local or off.")
+        .def_readwrite("max_fov_ratio", &SearchOptions::max_fov_ratio,
+                       "Largest ratio of the two fields of view, either way, in tangents; > 1.")
+        .def_readwrite("max_roll_deg", &SearchOptions::max_roll_deg, "[deg], in [0, 180].")
+        .def_readwrite("min_overlap", &SearchOptions::min_overlap,
+                       "Geometric mean of the shares of both images' edges, in (0, 1).")
+        .def_readwrite("map_width", &SearchOptions::map_width, "Width searched at [px], >= 32.")
+        .def_readwrite("candidates", &SearchOptions::candidates,
+                       "Peaks refined before one is chosen, >= 1.");
+
+    py::class_<CalibrationOptions>(m, "CalibrationOptions",
+                                   "Options of calibrate(). Keyword arguments set fields.")
+        .def(py::init(&options_from<CalibrationOptions>))
+        .def_readwrite("max_frames", &CalibrationOptions::max_frames,
+                       "Pairs used, spread over the footage; >= 1.")
+        .def_readwrite("seed", &CalibrationOptions::seed, "Of the frame choice.")
+        .def_readwrite("num_threads", &CalibrationOptions::num_threads, "0 uses every core.")
+        .def_readwrite("working_width", &CalibrationOptions::working_width,
+                       "References are reduced by a whole factor to at most this width [px].")
+        .def_readwrite("max_iterations", &CalibrationOptions::max_iterations,
+                       "Per stage and level; >= 1.")
+        .def_readwrite("prior_weight", &CalibrationOptions::prior_weight,
+                       "gamma of Eq. (total_loss), in stage 1; >= 0.")
+        .def_readwrite("reference_camera", &CalibrationOptions::reference_camera,
+                       "Known intrinsics, frozen, or None.")
+        .def_readwrite("source_camera", &CalibrationOptions::source_camera,
+                       "Known intrinsics, frozen, or None.")
+        .def_readwrite("reference_hfov_deg", &CalibrationOptions::reference_hfov_deg,
+                       "Horizontal field of view to assume [deg], or None to search it.")
+        .def_readwrite("optimize_reference", &CalibrationOptions::optimize_reference,
+                       "Free the reference's intrinsics too; they are coupled with the source's.")
+        .def_readwrite("search", &CalibrationOptions::search, "SearchOptions.")
+        .def("validate", &CalibrationOptions::validate,
+             "Raises ValueError naming the field, its value and the allowed range.");
+
+    py::class_<LevelReport>(m, "LevelReport", "One solve: a stage at a level of the pyramid.")
+        .def_readonly("factor", &LevelReport::factor, "Reduction of the working images.")
+        .def_readonly("stage", &LevelReport::stage, "1 or 2, as in the paper.")
+        .def_readonly("width", &LevelReport::width, "[px]")
+        .def_readonly("height", &LevelReport::height, "[px]")
+        .def_readonly("iterations", &LevelReport::iterations, "Of Levenberg-Marquardt.")
+        .def_readonly("initial_cost", &LevelReport::initial_cost, "Eq. (image_loss), and the prior in stage 1.")
+        .def_readonly("final_cost", &LevelReport::final_cost, "The same at the end.")
+        .def_readonly("nec", &LevelReport::nec, "Mean over the pairs, weighted by c_i.")
+        .def_readonly("valid_share", &LevelReport::valid_share,
+                      "Share of the reference's edge energy that the source covers.")
+        .def_readonly("condition_number", &LevelReport::condition_number,
+                      "Of the normal equations, columns scaled to unit norm.")
+        .def_readonly("seconds", &LevelReport::seconds, "[s]")
+        .def_readonly("stopped", &LevelReport::stopped, "Why it stopped.");
+
+    py::class_<CandidateReport>(m, "CandidateReport", "A peak of the search, and what became of it.")
+        .def_readonly("score", &CandidateReport::score, "Contrast against the typical value.")
+        .def_readonly("correlation", &CandidateReport::correlation,
+                      "Pooled over the frames, of doubled angles, in [-1, 1].")
+        .def_readonly("overlap", &CandidateReport::overlap, "Of both images' edges.")
+        .def_readonly("refined_nec", &CandidateReport::refined_nec, "After the coarse levels.")
+        .def_readonly("found", &CandidateReport::found, "Rig, by the search.")
+        .def_readonly("refined", &CandidateReport::refined, "Rig, after the coarse levels.");
+
+    py::class_<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
+        .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
+        .def_readonly("message", &CalibrationReport::message, "Why, in one line.")
+        .def_readonly("seconds", &CalibrationReport::seconds, "[s]")
+        .def_readonly("search_seconds", &CalibrationReport::search_seconds, "[s]")
+        .def_readonly("working_width", &CalibrationReport::working_width, "[px]")
+        .def_readonly("working_height", &CalibrationReport::working_height, "[px]")
+        .def_readonly("nec", &CalibrationReport::nec, "At the finest level.")
+        .def_readonly("baseline_nec", &CalibrationReport::baseline_nec,
+                      "Typical of rigs displaced by many pixels.")
+        .def_readonly("valid_share", &CalibrationReport::valid_share, "Of the reference's edge energy.")
+        .def_readonly("frames", &CalibrationReport::frames, "Indices of the pairs used.")
+        .def_readonly("candidates", &CalibrationReport::candidates, "Of the search, best score first.")
+        .def_readonly("levels", &CalibrationReport::levels, "In the order solved.")
+        .def("brief", &CalibrationReport::brief, "One line.")
+        .def("full", &CalibrationReport::full, "A table.")
+        .def("to_dict", &dict_of, "Plain lists and numbers, as for JSON.");
+
+    py::class_<CalibrationResult>(m, "CalibrationResult", "What calibrate() returns.")
+        .def_readonly("rig", &CalibrationResult::rig, "The best rig found.")
+        .def_readonly("converged", &CalibrationResult::converged, "Is it to be trusted?")
+        .def_readonly("report", &CalibrationResult::report, "CalibrationReport.");
+
+    m.def("choose_frames", &choose_frames, py::arg("count"), py::arg("max_frames"), py::arg("seed"),
+          "Indices of max_frames of count frames, spread over all, drawn with seed; sorted.");
+
+    m.def(
+        "calibrate",
+        [](const py::sequence& references, const py::sequence& sources, const py::sequence& depths,
+           const std::optional<Rig>& initial, const CalibrationOptions& options,
+           const py::object& progress) {
+            const HeldList r = list_of("reference", references, image_of);
+            const HeldList s = list_of("source", sources, image_of);
+            const HeldList d = list_of("depth", depths, depth_of);
+            const Progress tell = [&progress](const std::string& stage, double share) {
+                const py::gil_scoped_acquire gil;
+                if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
+                if (!progress.is_none()) progress(stage, share);
+            };
+            const py::gil_scoped_release unlocked;
+            return calibrate(r.views, s.views, d.views, initial, options, tell);
+        },
+        py::arg("references"), py::arg("sources"), py::arg("depths"),
+        py::arg("initial") = py::none(), py::arg("options") = CalibrationOptions{},
+        py::arg("progress") = py::none(),
+        R"(Estimates the rig from footage and depth, without a target.
+
+references, sources: sequences of (H, W) or (H, W, 3) uint8 | uint16 | float32 images, pairs by
+index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN / inf unknown.
+initial: Rig to start from. progress: called with (stage, share of the work done).
+Images are copied only where their rows are not contiguous.
+
+Raises ValueError, naming the frame, on unusable input. Not to converge is a result:
+see CalibrationResult.converged.)");
+
+    py::class_<Registrar>(m, "Registrar", R"(One rig, a stream of frames, Eq. (warping).
+
+num_threads: 0 uses every core. Raises ValueError where the rig is not valid.)")
+        .def(py::init<const Rig&, int>(), py::arg("rig"), py::arg("num_threads") = 0)
+        .def_property_readonly("rig", &Registrar::rig, "A copy of the rig.",
+                               py::return_value_policy::copy)
+        .def(
+            "map",
+            [](const Registrar& registrar, const py::object& depth) {
+                const Held d = depth_of("depth", depth);
+                const Pinhole& grid = registrar.rig().reference;
+                py::array_t<float> out({grid.height, grid.width, 2});
+                float* data = out.mutable_data();
+                {
+                    const py::gil_scoped_release unlocked;
+                    registrar.map(d.view, data);
+                }
+                return out;
+            },
+            py::arg("depth"),
+            "(H, W, 2) float32: x and y in the source image [px] of each reference pixel, NaN where "
+            "it has none. depth: (h, w) float32 [m] of the reference's aspect.")
+        .def(
+            "register",
+            [](const Registrar& registrar, const py::object& source, const py::object& depth) {
+                const Held s = image_of("source", source);
+                const Held d = depth_of("depth", depth);
+                const Pinhole& grid = registrar.rig().reference;
+                std::vector<py::ssize_t> shape{grid.height, grid.width};
+                if (s.array.ndim() == 3) shape.push_back(s.array.shape(2));
+                py::array image(s.array.dtype(), shape);
+                py::array_t<std::uint8_t> mask({grid.height, grid.width});
+                const MutableImageView out{
+                    image.mutable_data(), grid.width, grid.height, s.view.channels, s.view.type,
+                    static_cast<std::ptrdiff_t>(grid.width * s.view.channels *
+                                                image.itemsize())};
+                std::uint8_t* codes = mask.mutable_data();
+                {
+                    const py::gil_scoped_release unlocked;
+                    registrar.register_frame(s.view, d.view, out, codes);
+                }
+                return py::make_tuple(image, mask);
+            },
+            py::arg("source"), py::arg("depth"),
+            R"(The source on the reference grid, and what each pixel is worth.
+
+source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth: (h, w) float32
+[m] of the reference's aspect. Returns (image, mask): image (H, W[, 3]) in the source's dtype, 0
+where not valid; mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
+Raises ValueError with shapes and dtypes.)");
+
+    m.def(
+        "nec",
+        [](const py::object& a, const py::object& b, const py::object& mask,
+           const std::string& floor) {
+            if (floor != "none" && floor != "printed")
+                throw py::value_error("floor is '" + floor + "', expected none or printed");
+            const Compared c = compared(a, b, mask);
+            const py::gil_scoped_release unlocked;
+            return nec(c.reference, c.registered, c.valid,
+                       floor == "printed" ? NecFloor::printed : NecFloor::none);
+        },
+        py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(),
+        py::arg("floor") = "none",
+        R"(Normalized Edge Correlation, Eq. (nec), in [0, 1]; NaN where no edge is left.
+
+Images (H, W) or (H, W, 3) of one size; mask (H, W), nonzero where valid. floor: "none" (upper clamp
+only, as the authors' code) or "printed" (Eq. (gradient_clamping) as printed).)");
+    const auto metric = [&m](const char* name, auto function, const char* doc) {
+        m.def(
+            name,
+            [function](const py::object& a, const py::object& b, const py::object& mask) {
+                const Compared c = compared(a, b, mask);
+                const py::gil_scoped_release unlocked;
+                return function(c.reference, c.registered, c.valid);
+            },
+            py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(), doc);
+    };
+    metric("gc", &gc, "Gradient correlation: mean over x and y of the zero-mean normalized correlation "
+                      "of the absolute forward differences, in [-1, 1]. Images and mask as in nec().");
+    metric("ncc", &ncc, "Zero-mean normalized cross correlation, in [-1, 1]. Images and mask as in nec().");
+    metric("rmse", &rmse, "Root mean square error of gray values; integers scaled to [0, 1]. Images "
+                          "and mask as in nec().");
+    const auto ranged = [&m](const char* name, auto function, const char* doc) {
+        m.def(
+            name,
+            [function](const py::object& a, const py::object& b, const py::object& mask,
+                       const py::object& data_range) {
+                const Compared c = compared(a, b, mask);
+                const double range = range_of(a, data_range);
+                const py::gil_scoped_release unlocked;
+                return function(c.reference, c.registered, c.valid, range);
+            },
+            py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(),
+            py::arg("data_range") = py::none(), doc);
+    };
+    ranged("ssim", &ssim, "Structural similarity (Wang et al. 2004), Gaussian window of sigma 1.5 px, "
+                          "over pixels whose 11 x 11 window is valid. data_range: span of the gray "
+                          "values, 1 by default. Images and mask as in nec().");
+    ranged("psnr", &psnr, "Peak signal-to-noise ratio [dB], 20 log10(data_range / RMSE). Images, mask "
+                          "and data_range as in ssim().");
+
+    m.def(
+        "patch_shifts",
+        [](const py::object& a, const py::object& b, const py::object& mask) {
+            const Compared c = compared(a, b, mask);
+            std::vector<PatchShift> shifts;
+            {
+                const py::gil_scoped_release unlocked;
+                shifts = patch_residual(c.reference, c.registered, c.valid);
+            }
+            py::array_t<float> out({static_cast<py::ssize_t>(shifts.size()), py::ssize_t{4}});
+            auto rows = out.mutable_unchecked<2>();
+            for (std::size_t i = 0; i < shifts.size(); ++i) {
+                const PatchShift& s = shifts[i];
+                const float row[4] = {s.center_x, s.center_y, s.dx, s.dy};
+                for (int k = 0; k < 4; ++k) rows(static_cast<py::ssize_t>(i), k) = row[k];
+            }
+            return out;
+        },
+        py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(),
+        "(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches that tell; see "
+        "metrics.patch_residual().");
+}

@@ -1,0 +1,120 @@
+#include "xcalib/calibrate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+#include "solve.hpp"
+#include "start.hpp"
+#include "working_images.hpp"
+
+namespace xcalib {
+namespace {
+
+void require(bool ok, const char* field, double value, const char* expected) {
+    if (ok) return;
+    std::string text = std::to_string(value);
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+    throw std::invalid_argument(std::string("options: ") + field + " = " + text + ", expected " +
+                                expected);
+}
+
+}  // namespace
+
+void CalibrationOptions::validate() const {
+    require(max_frames >= 1, "max_frames", max_frames, "at least 1");
+    require(num_threads >= 0, "num_threads", num_threads, "0 (every core) or more");
+    require(working_width >= 64, "working_width", working_width, "at least 64 px");
+    require(max_iterations >= 1, "max_iterations", max_iterations, "at least 1");
+    require(std::isfinite(prior_weight) && prior_weight >= 0, "prior_weight", prior_weight,
+            "a finite number >= 0");
+    if (reference_hfov_deg)
+        require(*reference_hfov_deg > 0 && *reference_hfov_deg < 180, "reference_hfov_deg",
+                *reference_hfov_deg, "an angle in (0, 180) deg");
+    if (reference_camera) reference_camera->validate("options: reference_camera");
+    if (source_camera) source_camera->validate("options: source_camera");
+    require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
+            search.max_fov_ratio, "a ratio in (1, 10]");
+    require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",
+            search.max_roll_deg, "an angle in [0, 180] deg");
+    require(search.min_overlap > 0 && search.min_overlap < 1, "search.min_overlap",
+            search.min_overlap, "a share in (0, 1)");
+    require(search.map_width >= 32, "search.map_width", search.map_width, "at least 32 px");
+    require(search.candidates >= 1, "search.candidates", search.candidates, "at least 1");
+}
+
+std::vector<int> choose_frames(int count, int max_frames, std::uint32_t seed) {
+    if (count < 0 || max_frames < 1)
+        throw std::invalid_argument("choose_frames: count = " + std::to_string(count) +
+                                    " and max_frames = " + std::to_string(max_frames) +
+                                    ", expected >= 0 and >= 1");
+    std::vector<int> chosen;
+    if (count <= max_frames) {
+        for (int i = 0; i < count; ++i) chosen.push_back(i);
+        return chosen;
+    }
+    // One from each of max_frames equal parts of the footage. The raw generator, since what the
+    // standard's distributions draw differs between libraries.
+    std::mt19937 generator(seed);
+    for (int i = 0; i < max_frames; ++i) {
+        const auto first = static_cast<std::int64_t>(count) * i / max_frames;
+        const auto last = static_cast<std::int64_t>(count) * (i + 1) / max_frames;
+        chosen.push_back(static_cast<int>(first + generator() % (last - first)));
+    }
+    return chosen;
+}
+
+CalibrationResult calibrate(const std::vector<ImageView>& references,
+                            const std::vector<ImageView>& sources,
+                            const std::vector<ImageView>& depths,
+                            const std::optional<Rig>& initial, const CalibrationOptions& options,
+                            const Progress& progress) {
+    const double start = seconds_now();
+    const auto tell = [&](const char* stage, double share) {
+        if (progress) progress(stage, share);
+    };
+    options.validate();
+    validate_frames(references, sources, depths);
+    if (initial) initial->validate();
+
+    CalibrationResult result;
+    CalibrationReport& report = result.report;
+    report.frames =
+        choose_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
+    tell("prepare", 0.0);
+    const WorkingImages images =
+        make_working_images(references, sources, depths, report.frames, options.working_width,
+                            options.num_threads);
+    report.working_width = images.references[0].width;
+    report.working_height = images.references[0].height;
+
+    tell("search", 0.05);
+    const Start found = find_start(images, references[0], sources[0], initial, options,
+                                   [&](double share) { tell("search", 0.05 + 0.55 * share); });
+    report.search_seconds = found.search_seconds;
+    report.candidates = found.candidates;
+    report.levels = found.levels;
+    result.rig = found.rig;
+
+    // All frames, from the first level at which everything is free.
+    double share_limit = 0;
+    const std::vector<Step> steps = schedule(report.working_width, report.working_height);
+    for (std::size_t s = 0; s < steps.size(); ++s) {
+        if (steps[s].stage == 1) continue;
+        const Level level = make_level(images, steps[s].factor, result.rig, options.num_threads);
+        if (share_limit == 0)
+            share_limit = 0.8 * pooled(level, result.rig, options.num_threads).valid_share;
+        report.levels.push_back(
+            solve_level(level, steps[s].stage, share_limit, options, result.rig));
+        tell("refine", 0.6 + 0.4 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
+    }
+    report.nec = report.levels.back().nec;
+    report.valid_share = report.levels.back().valid_share;
+    report.converged = result.converged = true;
+    report.seconds = seconds_now() - start;
+    return result;
+}
+
+}  // namespace xcalib

@@ -1,0 +1,219 @@
+#include "xcalib/image.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <opencv2/imgproc.hpp>
+#include <sstream>
+#include <stdexcept>
+
+namespace xcalib {
+namespace {
+
+cv::Mat as_mat(const Image& image) {
+    return cv::Mat(image.height, image.width, CV_32FC1, const_cast<float*>(image.pixels.data()));
+}
+
+template <class T>
+const T* view_row(const ImageView& image, int y) {
+    return reinterpret_cast<const T*>(static_cast<const char*>(image.data) + y * image.row_bytes);
+}
+
+template <class T>
+void gray_rows(const ImageView& image, float scale, Image& gray) {
+    for (int y = 0; y < image.height; ++y) {
+        const T* in = view_row<T>(image, y);
+        float* out = gray.row(y);
+        if (image.channels == 1) {
+            for (int x = 0; x < image.width; ++x) out[x] = scale * static_cast<float>(in[x]);
+        } else {  // ITU-R BT.601 luma
+            for (int x = 0; x < image.width; ++x)
+                out[x] = scale * (0.114f * static_cast<float>(in[3 * x]) +
+                                  0.587f * static_cast<float>(in[3 * x + 1]) +
+                                  0.299f * static_cast<float>(in[3 * x + 2]));
+        }
+    }
+}
+
+// A sample of about 100 000 pixels is enough for percentiles and costs little.
+std::vector<float> sorted_sample(const Image& image) {
+    const std::size_t step = std::max<std::size_t>(1, image.pixels.size() / 100000);
+    std::vector<float> sample;
+    sample.reserve(image.pixels.size() / step + 1);
+    for (std::size_t i = 0; i < image.pixels.size(); i += step) sample.push_back(image.pixels[i]);
+    std::sort(sample.begin(), sample.end());
+    return sample;
+}
+
+bool known(float depth) { return depth > 0.0f && std::isfinite(depth); }
+
+// Depths within this ratio of one another are taken for one surface.
+constexpr float kSameSurface = 1.1f;
+
+float reduced_depth(const Image& depth, double x0, double x1, double y0, double y1) {
+    const int left = static_cast<int>(std::floor(x0 + 0.5));
+    const int right = std::max(left + 1, static_cast<int>(std::floor(x1 + 0.5)));
+    const int top = static_cast<int>(std::floor(y0 + 0.5));
+    const int bottom = std::max(top + 1, static_cast<int>(std::floor(y1 + 0.5)));
+    float values[256];
+    int count = 0, cells = 0;
+    for (int y = top; y < std::min(bottom, depth.height); ++y)
+        for (int x = left; x < std::min(right, depth.width); ++x, ++cells)
+            if (const float d = depth.row(y)[x]; d > 0 && count < 256) values[count++] = d;
+    if (2 * count < cells || count == 0) return 0.0f;
+    std::nth_element(values, values + count / 2, values + count);
+    const float median = values[count / 2];
+    double inverse = 0;
+    int members = 0;
+    for (int i = 0; i < count; ++i)
+        if (values[i] < median * kSameSurface && values[i] * kSameSurface > median) {
+            inverse += 1.0 / values[i];
+            ++members;
+        }
+    return static_cast<float>(members / inverse);
+}
+
+float interpolated_depth(const Image& depth, double x, double y) {
+    const int nx = std::clamp(static_cast<int>(std::lround(x)), 0, depth.width - 1);
+    const int ny = std::clamp(static_cast<int>(std::lround(y)), 0, depth.height - 1);
+    const float nearest = depth.row(ny)[nx];
+    if (nearest <= 0) return 0.0f;
+    const int x0 = std::clamp(static_cast<int>(std::floor(x)), 0, depth.width - 1);
+    const int y0 = std::clamp(static_cast<int>(std::floor(y)), 0, depth.height - 1);
+    const int x1 = std::min(x0 + 1, depth.width - 1), y1 = std::min(y0 + 1, depth.height - 1);
+    const float d[4] = {depth.row(y0)[x0], depth.row(y0)[x1], depth.row(y1)[x0], depth.row(y1)[x1]};
+    for (float value : d)
+        if (value <= 0 || value > nearest * kSameSurface || value * kSameSurface < nearest)
+            return nearest;
+    const double ax = std::clamp(x - x0, 0.0, 1.0), ay = std::clamp(y - y0, 0.0, 1.0);
+    const double inverse = (1 - ay) * ((1 - ax) / d[0] + ax / d[1]) +
+                           ay * ((1 - ax) / d[2] + ax / d[3]);
+    return static_cast<float>(1.0 / inverse);
+}
+
+}  // namespace
+
+std::size_t bytes_per_channel(PixelType type) {
+    switch (type) {
+        case PixelType::u8: return 1;
+        case PixelType::u16: return 2;
+        case PixelType::f32: return 4;
+    }
+    throw std::invalid_argument("unknown pixel type");
+}
+
+Image to_gray(const ImageView& image) {
+    if (image.channels != 1 && image.channels != 3)
+        throw std::invalid_argument("image has " + std::to_string(image.channels) +
+                                    " channels, expected 1 or 3");
+    Image gray(image.width, image.height);
+    switch (image.type) {
+        case PixelType::u8: gray_rows<std::uint8_t>(image, 1.0f / 255, gray); break;
+        case PixelType::u16: gray_rows<std::uint16_t>(image, 1.0f / 65535, gray); break;
+        case PixelType::f32:
+            gray_rows<float>(image, 1.0f, gray);
+            for (std::size_t i = 0; i < gray.pixels.size(); ++i)
+                if (!std::isfinite(gray.pixels[i])) {
+                    std::ostringstream message;
+                    message << "image has the value " << gray.pixels[i] << " at x = "
+                            << i % image.width << ", y = " << i / image.width
+                            << ", expected finite pixels";
+                    throw std::invalid_argument(message.str());
+                }
+            break;
+    }
+    return gray;
+}
+
+Image resize_area(const Image& image, int width, int height) {
+    if (width == image.width && height == image.height) return image;
+    Image out(width, height);
+    const bool reduces = width <= image.width && height <= image.height;
+    cv::Mat result = as_mat(out);
+    cv::resize(as_mat(image), result, result.size(), 0, 0,
+               reduces ? cv::INTER_AREA : cv::INTER_LINEAR);
+    return out;
+}
+
+Image gaussian_blur(const Image& image, double sigma_px) {
+    if (sigma_px <= 0) return image;
+    Image out(image.width, image.height);
+    cv::Mat result = as_mat(out);
+    cv::GaussianBlur(as_mat(image), result, cv::Size(), sigma_px, sigma_px,
+                     cv::BORDER_REPLICATE);
+    return out;
+}
+
+Image normalize_percentiles(const Image& image) {
+    const std::vector<float> sample = sorted_sample(image);
+    float low = sample[sample.size() / 100];
+    float high = sample[sample.size() - 1 - sample.size() / 100];
+    if (!(high > low)) {  // nearly all pixels equal: take what there is
+        const auto [min, max] = std::minmax_element(image.pixels.begin(), image.pixels.end());
+        low = *min;
+        high = *max;
+    }
+    if (!(high > low)) {
+        std::ostringstream message;
+        message << "image is constant (every pixel is " << low << "), expected edges";
+        throw std::invalid_argument(message.str());
+    }
+    Image out = image;
+    for (float& value : out.pixels) value = std::clamp((value - low) / (high - low), 0.0f, 1.0f);
+    return out;
+}
+
+Image normalize_dark(const Image& image) {
+    constexpr float kMedian = 0.4f;
+    constexpr float kStrongest = 100.0f;
+    Image out = normalize_percentiles(image);
+    const std::vector<float> sample = sorted_sample(out);
+    const float median = sample[sample.size() / 2];
+    if (median >= kMedian) return out;
+    float low = 0.0f, high = kStrongest;
+    for (int i = 0; i < 30; ++i) {
+        const float k = 0.5f * (low + high);
+        (std::log1p(k * median) < kMedian * std::log1p(k) ? low : high) = k;
+    }
+    const float k = high, scale = 1.0f / std::log1p(k);
+    for (float& value : out.pixels) value = scale * std::log1p(k * value);
+    return out;
+}
+
+Image clean_depth(const ImageView& depth) {
+    if (depth.type != PixelType::f32 || depth.channels != 1)
+        throw std::invalid_argument("depth must be one float32 channel in metres");
+    Image out(depth.width, depth.height);
+    for (int y = 0; y < depth.height; ++y) {
+        const float* in = view_row<float>(depth, y);
+        for (int x = 0; x < depth.width; ++x) out.row(y)[x] = known(in[x]) ? in[x] : 0.0f;
+    }
+    return out;
+}
+
+Image resize_depth(const Image& depth, int width, int height) {
+    if (width == depth.width && height == depth.height) return depth;
+    const double sx = static_cast<double>(depth.width) / width;
+    const double sy = static_cast<double>(depth.height) / height;
+    const bool reduces = sx > 1 && sy > 1;
+    Image out(width, height);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            out.row(y)[x] =
+                reduces ? reduced_depth(depth, x * sx, (x + 1) * sx, y * sy, (y + 1) * sy)
+                        : interpolated_depth(depth, (x + 0.5) * sx - 0.5, (y + 0.5) * sy - 0.5);
+    return out;
+}
+
+void require_same_aspect(const char* name, int width, int height, int expected_width,
+                         int expected_height) {
+    const long difference = std::labs(static_cast<long>(width) * expected_height -
+                                      static_cast<long>(height) * expected_width);
+    if (width > 0 && height > 0 && difference <= std::max(expected_width, expected_height)) return;
+    std::ostringstream message;
+    message << name << " is " << width << "x" << height << ", expected the aspect of "
+            << expected_width << "x" << expected_height;
+    throw std::invalid_argument(message.str());
+}
+
+}  // namespace xcalib

@@ -1,0 +1,54 @@
+// Splits a range over threads. Each index is handled whole by one thread, so what is computed per
+// index does not depend on how many there are.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace xcalib {
+
+inline int resolve_threads(int num_threads) {
+    if (num_threads > 0) return num_threads;
+    return std::max(1u, std::thread::hardware_concurrency());
+}
+
+// Calls work(begin, end) on consecutive parts of [0, count). The first exception is passed on.
+template <class Work>
+void parallel_ranges(int count, int num_threads, const Work& work) {
+    const int parts = std::min(resolve_threads(num_threads), count);
+    if (parts <= 1) {
+        if (count > 0) work(0, count);
+        return;
+    }
+    std::exception_ptr error;
+    std::mutex error_mutex;
+    const auto guarded = [&](int part) {
+        try {
+            work(static_cast<int>(static_cast<long>(count) * part / parts),
+                 static_cast<int>(static_cast<long>(count) * (part + 1) / parts));
+        } catch (...) {
+            const std::lock_guard<std::mutex> lock(error_mutex);
+            if (!error) error = std::current_exception();
+        }
+    };
+    std::vector<std::thread> threads;
+    for (int part = 1; part < parts; ++part) threads.emplace_back(guarded, part);
+    guarded(0);
+    for (std::thread& thread : threads) thread.join();
+    if (error) std::rethrow_exception(error);
+}
+
+// Calls work(index) for each index of [0, count), whichever thread is free taking the next.
+template <class Work>
+void parallel_each(int count, int num_threads, const Work& work) {
+    std::atomic<int> next{0};
+    parallel_ranges(std::min(resolve_threads(num_threads), count), num_threads, [&](int, int) {
+        for (int i = next++; i < count; i = next++) work(i);
+    });
+}
+
+}  // namespace xcalib

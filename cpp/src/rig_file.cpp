@@ -1,0 +1,188 @@
+#include "xcalib/rig_file.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <initializer_list>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+
+#include <unistd.h>
+
+namespace xcalib {
+namespace {
+
+[[noreturn]] void reject(const std::string& path, const std::string& what) {
+    throw std::invalid_argument(path + ": " + what);
+}
+
+// The shortest text that reads back as the same double, whatever the locale.
+std::string text_of(double value) {
+    char buffer[32];
+    const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
+    return std::string(buffer, end);
+}
+
+// A mapping of which every key is known and present.
+class Section {
+   public:
+    Section(const std::string& path, std::string name, const YAML::Node& node,
+            std::initializer_list<const char*> keys)
+        : path_(path), name_(std::move(name)), node_(node) {
+        if (!node.IsMap()) reject(path, "expected a mapping of fields in " + name_);
+        for (const auto& item : node) {
+            const std::string key = item.first.as<std::string>();
+            bool known = false;
+            for (const char* expected : keys) known = known || key == expected;
+            if (!known) reject(path, "unknown field '" + key + "' in " + name_);
+        }
+        for (const char* key : keys)
+            if (!node[key]) reject(path, std::string("missing field '") + key + "' in " + name_);
+    }
+
+    YAML::Node node(const char* key) const { return node_[key]; }
+
+    std::string text(const char* key) const {
+        if (!node_[key].IsScalar()) fail(key, "(not a single value)", "text");
+        return node_[key].Scalar();
+    }
+
+    int size(const char* key) const {
+        int value = 0;
+        if (!YAML::convert<int>::decode(node_[key], value) || value < 1)
+            fail(key, scalar(node_[key]), "a whole number of px, at least 1");
+        return value;
+    }
+
+    double number(const char* key) const { return number(key, node_[key]); }
+
+    std::vector<double> numbers(const char* key, std::size_t count) const {
+        const YAML::Node list = node_[key];
+        if (!list.IsSequence() || list.size() != count)
+            fail(key, list.IsSequence() ? std::to_string(list.size()) + " values" : scalar(list),
+                 "a list of " + std::to_string(count) + " numbers");
+        std::vector<double> out;
+        for (const YAML::Node& item : list) out.push_back(number(key, item));
+        return out;
+    }
+
+    [[noreturn]] void fail(const char* key, const std::string& value,
+                           const std::string& expected) const {
+        reject(path_, name_ + "." + key + " = " + value + ", expected " + expected);
+    }
+
+   private:
+    static std::string scalar(const YAML::Node& node) {
+        return node.IsScalar() ? node.Scalar() : "(not a single value)";
+    }
+    double number(const char* key, const YAML::Node& node) const {
+        double value = 0;
+        if (!YAML::convert<double>::decode(node, value) || !std::isfinite(value))
+            fail(key, scalar(node), "a finite number");
+        return value;
+    }
+
+    const std::string& path_;
+    std::string name_;
+    YAML::Node node_;
+};
+
+Pinhole read_camera(const std::string& path, const char* name, const YAML::Node& node) {
+    const Section section(path, name, node,
+                          {"width", "height", "fx", "fy", "cx", "cy", "skew"});
+    Pinhole camera;
+    camera.width = section.size("width");
+    camera.height = section.size("height");
+    camera.fx = section.number("fx");
+    camera.fy = section.number("fy");
+    camera.cx = section.number("cx");
+    camera.cy = section.number("cy");
+    camera.skew = section.number("skew");
+    return camera;
+}
+
+void write_camera(std::ostream& out, const char* name, const Pinhole& camera) {
+    out << name << ":\n"
+        << "  width: " << camera.width << "\n"
+        << "  height: " << camera.height << "\n"
+        << "  fx: " << text_of(camera.fx) << "\n"
+        << "  fy: " << text_of(camera.fy) << "\n"
+        << "  cx: " << text_of(camera.cx) << "\n"
+        << "  cy: " << text_of(camera.cy) << "\n"
+        << "  skew: " << text_of(camera.skew) << "\n";
+}
+
+Rig parse_rig(const std::string& path, const YAML::Node& root) {
+    const Section file(path, "the file", root,
+                       {"format", "version", "reference", "source", "source_from_reference"});
+    if (file.text("format") != "xcalib-rig") file.fail("format", file.text("format"), "xcalib-rig");
+    if (file.text("version") != "1") file.fail("version", file.text("version"), "1");
+    const Section pose(path, "source_from_reference", file.node("source_from_reference"),
+                       {"quaternion_wxyz", "translation_m"});
+    const std::vector<double> q = pose.numbers("quaternion_wxyz", 4);
+    const std::vector<double> t = pose.numbers("translation_m", 3);
+    Rig rig;
+    rig.reference = read_camera(path, "reference", file.node("reference"));
+    rig.source = read_camera(path, "source", file.node("source"));
+    rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    rig.source_from_reference.translation = Eigen::Vector3d(t[0], t[1], t[2]);
+    try {
+        rig.validate();
+    } catch (const std::invalid_argument& error) {
+        reject(path, error.what());
+    }
+    return rig;
+}
+
+}  // namespace
+
+Rig load_rig(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    std::stringstream text;
+    // Reading a folder fails only here.
+    if (!in || !(text << in.rdbuf()))
+        throw std::system_error(errno ? errno : EIO, std::generic_category(), path);
+    try {
+        return parse_rig(path, YAML::Load(text.str()));
+    } catch (const YAML::Exception& error) {
+        std::string what = error.what();
+        std::replace(what.begin(), what.end(), '\n', ' ');
+        reject(path, "not a YAML rig file: " + what);
+    }
+}
+
+void save_rig(const Rig& rig, const std::string& path) {
+    rig.validate();
+    const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
+    std::ostringstream out;
+    out << "format: xcalib-rig\nversion: 1\n";
+    write_camera(out, "reference", rig.reference);
+    write_camera(out, "source", rig.source);
+    out << "source_from_reference:\n"
+        << "  quaternion_wxyz: [" << text_of(q.w()) << ", " << text_of(q.x()) << ", "
+        << text_of(q.y()) << ", " << text_of(q.z()) << "]\n"
+        << "  translation_m: [" << text_of(rig.t().x()) << ", " << text_of(rig.t().y()) << ", "
+        << text_of(rig.t().z()) << "]\n";
+    const std::string beside = path + ".part" + std::to_string(::getpid());
+    {
+        std::ofstream file(beside, std::ios::binary);
+        if (!(file << out.str() << std::flush)) {
+            const int code = errno ? errno : EIO;
+            file.close();
+            std::remove(beside.c_str());
+            throw std::system_error(code, std::generic_category(), path);
+        }
+    }
+    if (std::rename(beside.c_str(), path.c_str()) != 0) {
+        const int code = errno;
+        std::remove(beside.c_str());
+        throw std::system_error(code, std::generic_category(), path);
+    }
+}
+
+}  // namespace xcalib

@@ -1,0 +1,381 @@
+#include "xcalib/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <mutex>
+#include <opencv2/core.hpp>
+
+#include "bilinear.hpp"
+#include "parallel.hpp"
+#include "xcalib/nec.hpp"
+
+namespace xcalib {
+namespace {
+
+using Complex = std::complex<float>;
+
+// A map of viewing directions: pan = step (x - center_x), Mercator ordinate step (y - center_y).
+struct DirectionMap {
+    double step;  // [rad / px]
+    int width, height;
+    double center_x() const { return 0.5 * (width - 1); }
+    double center_y() const { return 0.5 * (height - 1); }
+    // The direction of a map pixel, not normalized.
+    Eigen::Vector3d ray(int x, int y) const {
+        const double pan = step * (x - center_x()), ordinate = step * (y - center_y());
+        return {std::sin(pan), std::sinh(ordinate), std::cos(pan)};
+    }
+};
+
+// The map that holds the camera's whole image, at the given step.
+DirectionMap map_for(const Pinhole& camera, double step) {
+    const double left = std::atan((camera.cx + 0.5) / camera.fx);
+    const double right = std::atan((camera.width - 0.5 - camera.cx) / camera.fx);
+    const double top = std::asinh((camera.cy + 0.5) / camera.fy);
+    const double bottom = std::asinh((camera.height - 0.5 - camera.cy) / camera.fy);
+    DirectionMap map;
+    map.step = step;
+    map.width = 2 * static_cast<int>(std::ceil(std::max(left, right) / step)) + 1;
+    map.height = 2 * static_cast<int>(std::ceil(std::max(top, bottom) / step)) + 1;
+    return map;
+}
+
+// An image drawn on a map, as edges: z = a exp(2 i theta), of unit energy over the map.
+struct MapEdges {
+    std::vector<Complex> doubled;
+    std::vector<float> mask;
+};
+
+struct MapSampler {  // where each map pixel looks in the image; negative: outside
+    std::vector<float> u, v;
+};
+
+MapSampler map_sampler(const DirectionMap& map, const Pinhole& camera,
+                       const Eigen::Matrix3d& camera_from_map) {
+    MapSampler sampler;
+    const std::size_t size = static_cast<std::size_t>(map.width) * map.height;
+    sampler.u.assign(size, -1.0f);
+    sampler.v.assign(size, -1.0f);
+    for (int y = 0; y < map.height; ++y)
+        for (int x = 0; x < map.width; ++x) {
+            const Eigen::Vector3d ray = camera_from_map * map.ray(x, y);
+            if (ray.z() < 0.05 * ray.norm()) continue;
+            const Eigen::Vector2d p = project(camera, ray);
+            if (!(p.x() >= 0 && p.x() <= camera.width - 1 && p.y() >= 0 &&
+                  p.y() <= camera.height - 1))
+                continue;
+            const std::size_t i = static_cast<std::size_t>(y) * map.width + x;
+            sampler.u[i] = static_cast<float>(p.x());
+            sampler.v[i] = static_cast<float>(p.y());
+        }
+    return sampler;
+}
+
+MapEdges draw(const Image& image, const MapSampler& sampler, const DirectionMap& map) {
+    Image drawn(map.width, map.height);
+    std::vector<std::uint8_t> outside(drawn.pixels.size());
+    for (std::size_t i = 0; i < drawn.pixels.size(); ++i) {
+        outside[i] = sampler.u[i] < 0;
+        if (!outside[i]) drawn.pixels[i] = bilinear(image, sampler.u[i], sampler.v[i]).value;
+    }
+    const EdgeField field = edge_field(drawn, mean_gradient(drawn, outside.data()));
+    MapEdges edges;
+    edges.doubled.assign(drawn.pixels.size(), Complex(0));
+    edges.mask.assign(drawn.pixels.size(), 0.0f);
+    double energy = 0;
+    for (int y = 1; y + 1 < map.height; ++y)
+        for (int x = 1; x + 1 < map.width; ++x) {
+            const std::size_t i = static_cast<std::size_t>(y) * map.width + x;
+            if (outside[i - map.width] | outside[i - 1] | outside[i] | outside[i + 1] |
+                outside[i + map.width])
+                continue;  // the rim of a map is not an edge
+            edges.mask[i] = 1.0f;
+            const float vx = field.x[i], vy = field.y[i];
+            const float a = std::sqrt(vx * vx + vy * vy);
+            if (a <= 0) continue;
+            edges.doubled[i] = Complex((vx * vx - vy * vy) / a, 2 * vx * vy / a);
+            energy += a * a;
+        }
+    const float scale = energy > 0 ? static_cast<float>(1 / std::sqrt(energy)) : 0.0f;
+    for (Complex& z : edges.doubled) z *= scale;  // each frame has one say
+    return edges;
+}
+
+using Spectrum = cv::Mat;  // CV_32FC2
+
+Spectrum spectrum_of(const Complex* values, const DirectionMap& map, cv::Size size) {
+    cv::Mat padded = cv::Mat::zeros(size, CV_32FC2);
+    for (int y = 0; y < map.height; ++y)
+        std::copy_n(values + static_cast<std::size_t>(y) * map.width, map.width,
+                    padded.ptr<Complex>(y));
+    cv::dft(padded, padded, 0, map.height);
+    return padded;
+}
+
+Spectrum spectrum_of(const std::vector<float>& real, const DirectionMap& map, cv::Size size) {
+    return spectrum_of(std::vector<Complex>(real.begin(), real.end()).data(), map, size);
+}
+
+// All that one hypothesis of a camera gives: a spectrum per frame, and the pooled energy and mask.
+struct CameraSpectra {
+    std::vector<Spectrum> frames;
+    Spectrum energy, mask;
+    double total_energy = 0;
+};
+
+CameraSpectra camera_spectra(const std::vector<Image>& images, const DirectionMap& map,
+                             const Pinhole& camera, const Eigen::Matrix3d& camera_from_map,
+                             cv::Size size) {
+    CameraSpectra out;
+    const MapSampler sampler = map_sampler(map, camera, camera_from_map);
+    std::vector<float> energy(sampler.u.size(), 0.0f), mask;
+    for (const Image& image : images) {
+        MapEdges edges = draw(image, sampler, map);
+        for (std::size_t i = 0; i < energy.size(); ++i)
+            energy[i] += std::norm(edges.doubled[i]);
+        out.frames.push_back(spectrum_of(edges.doubled.data(), map, size));
+        mask = std::move(edges.mask);
+    }
+    for (float e : energy) out.total_energy += e;
+    out.energy = spectrum_of(energy, map, size);
+    out.mask = spectrum_of(mask, map, size);
+    return out;
+}
+
+// The spectrum of corr[shift] = sum_x conj(a[x]) b[x + shift], added to `sum`.
+void add_product(const Spectrum& a, const Spectrum& b, Spectrum& sum) {
+    for (int y = 0; y < a.rows; ++y) {
+        const Complex* pa = a.ptr<Complex>(y);
+        const Complex* pb = b.ptr<Complex>(y);
+        Complex* ps = sum.ptr<Complex>(y);
+        for (int x = 0; x < a.cols; ++x)
+            ps[x] += Complex(pa[x].real() * pb[x].real() + pa[x].imag() * pb[x].imag(),
+                             pa[x].real() * pb[x].imag() - pa[x].imag() * pb[x].real());
+    }
+}
+
+cv::Mat inverse(Spectrum& spectrum) {
+    cv::Mat out;
+    cv::dft(spectrum, out, cv::DFT_INVERSE | cv::DFT_SCALE);
+    return out;
+}
+
+struct Peak {
+    std::size_t reference, source, roll;
+    double dx, dy;  // source map - reference map, from centre to centre [px]
+    double score, correlation, overlap;
+};
+
+// A displacement of the map as a rotation: source_map_from_reference_map.
+Eigen::Matrix3d rotation_of_shift(double dx, double dy, double step) {
+    const double pan = dx * step;
+    const double tilt = 2 * std::atan(std::tanh(dy * step / 4)) * 2;  // 2 gd(dy step / 2)
+    // A point moves right (+x) by a turn about +y and down (+y) by a turn about -x.
+    return (Eigen::AngleAxisd(-tilt, Eigen::Vector3d::UnitX()) *
+            Eigen::AngleAxisd(pan, Eigen::Vector3d::UnitY()))
+        .toRotationMatrix();
+}
+
+double parabola_offset(double left, double here, double right) {
+    const double curvature = left - 2 * here + right;
+    return curvature < 0 ? std::clamp(0.5 * (left - right) / curvature, -0.5, 0.5) : 0.0;
+}
+
+std::vector<Peak> peaks_of(const CameraSpectra& reference, const CameraSpectra& source,
+                           const DirectionMap& reference_map, const DirectionMap& source_map,
+                           cv::Size size, const SearchSpace& space) {
+    Spectrum sum = cv::Mat::zeros(size, CV_32FC2), energies = cv::Mat::zeros(size, CV_32FC2);
+    for (std::size_t i = 0; i < reference.frames.size(); ++i)
+        add_product(reference.frames[i], source.frames[i], sum);
+    // Both norms in one transform: the reference's in the real part, the source's in the other.
+    Spectrum norm_s = cv::Mat::zeros(size, CV_32FC2);
+    add_product(reference.energy, source.mask, energies);
+    add_product(reference.mask, source.energy, norm_s);
+    for (int y = 0; y < size.height; ++y) {
+        Complex* e = energies.ptr<Complex>(y);
+        const Complex* s = norm_s.ptr<Complex>(y);
+        for (int x = 0; x < size.width; ++x) e[x] += Complex(-s[x].imag(), s[x].real());
+    }
+    const cv::Mat numerator = inverse(sum), norms = inverse(energies);
+    // Correlation index 0 puts the maps' first pixels on one another.
+    const double off_x = source_map.center_x() - reference_map.center_x();
+    const double off_y = source_map.center_y() - reference_map.center_y();
+    const double limit = space.max_shift > 0 ? space.max_shift * reference_map.width : 1e9;
+    const auto signed_shift = [](int i, int n, int first) { return i >= first ? i - n : i; };
+    cv::Mat score(size, CV_32F, cv::Scalar(-1)), overlap(size, CV_32F, cv::Scalar(0));
+    std::vector<float> typical;
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) {
+            const int sx = signed_shift(x, size.width, source_map.width);
+            const int sy = signed_shift(y, size.height, source_map.height);
+            if (std::abs(sx - off_x) > limit || std::abs(sy - off_y) > limit) continue;
+            const Complex norm = norms.at<Complex>(y, x);
+            const double share_r = std::max(0.0, norm.real() / reference.total_energy);
+            const double share_s = std::max(0.0, norm.imag() / source.total_energy);
+            const double both = std::sqrt(share_r * share_s);
+            if (both < space.min_overlap) continue;
+            const double value = numerator.at<Complex>(y, x).real() /
+                                 (both * std::sqrt(reference.total_energy * source.total_energy));
+            score.at<float>(y, x) = static_cast<float>(value);
+            overlap.at<float>(y, x) = static_cast<float>(both);
+            typical.push_back(static_cast<float>(value));
+        }
+    if (typical.size() < 9) return {};
+    std::nth_element(typical.begin(), typical.begin() + typical.size() / 2, typical.end());
+    const double median = typical[typical.size() / 2];
+    // Among misaligned images the value scatters with one over the root of the overlapping energy.
+    const auto z = [&](int y, int x) {
+        return (score.at<float>(y, x) - median) * std::sqrt(overlap.at<float>(y, x));
+    };
+    std::vector<Peak> peaks;
+    const auto wrap = [](int i, int n) { return (i + n) % n; };
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) {
+            const float here = score.at<float>(y, x);
+            if (here <= median) continue;
+            const float l = score.at<float>(y, wrap(x - 1, size.width));
+            const float r = score.at<float>(y, wrap(x + 1, size.width));
+            const float u = score.at<float>(wrap(y - 1, size.height), x);
+            const float d = score.at<float>(wrap(y + 1, size.height), x);
+            if (!(here > l && here >= r && here > u && here >= d)) continue;
+            if (std::min({l, r, u, d}) < 0) continue;  // at the rim of what is allowed
+            Peak peak{};
+            peak.dx = signed_shift(x, size.width, source_map.width) - off_x +
+                      parabola_offset(l, here, r);
+            peak.dy = signed_shift(y, size.height, source_map.height) - off_y +
+                      parabola_offset(u, here, d);
+            peak.score = z(y, x);
+            peak.correlation = here;
+            peak.overlap = overlap.at<float>(y, x);
+            peaks.push_back(peak);
+        }
+    const auto better = [](const Peak& a, const Peak& b) { return a.score > b.score; };
+    const std::size_t keep = std::min<std::size_t>(peaks.size(), 4);
+    std::partial_sort(peaks.begin(), peaks.begin() + keep, peaks.end(), better);
+    peaks.resize(keep);
+    return peaks;
+}
+
+Image reduced_for(const Image& image, double factor) {
+    if (factor <= 1) return gaussian_blur(image, 0.8);
+    const int width = std::max(8, static_cast<int>(std::lround(image.width / factor)));
+    const int height = std::max(8, static_cast<int>(std::lround(image.height / factor)));
+    return gaussian_blur(resize_area(image, width, height), 0.8);
+}
+
+std::vector<Image> reduced_for(const std::vector<Image>& images, double factor) {
+    std::vector<Image> out;
+    for (const Image& image : images) out.push_back(reduced_for(image, factor));
+    return out;
+}
+
+// Do two candidates lie in one basin? Compared by where they send the reference's inner points.
+double distance(const Rig& a, const Rig& b) {
+    const Eigen::Matrix3d ha = infinite_homography(a), hb = infinite_homography(b);
+    double sum = 0;
+    for (double y : {0.3, 0.5, 0.7})
+        for (double x : {0.3, 0.5, 0.7}) {
+            const Eigen::Vector3d p(x * a.reference.width, y * a.reference.height, 1);
+            sum += ((ha * p).hnormalized() - (hb * p).hnormalized()).norm();
+        }
+    return sum / 9 / a.source.width;
+}
+
+}  // namespace
+
+std::vector<SearchCandidate> global_search(const std::vector<Image>& references,
+                                           const std::vector<Image>& sources,
+                                           const SearchSpace& space, int num_threads) {
+    std::vector<Peak> all;
+    std::vector<double> steps;
+    std::mutex mutex;
+    const std::vector<Image> reduced =
+        reduced_for(references, static_cast<double>(references[0].width) / space.map_width);
+    for (std::size_t r = 0; r < space.hypotheses.size(); ++r) {
+        const SearchHypothesis& hypothesis = space.hypotheses[r];
+        const Pinhole camera = hypothesis.reference.resized(reduced[0].width, reduced[0].height);
+        const double step = 1 / camera.fx;
+        steps.push_back(step);
+        const DirectionMap map = map_for(camera, step);
+        // Few transform sizes, so that the reference's spectra serve many source cameras.
+        const auto transform_size = [&](const DirectionMap& source_map) {
+            const auto round_up = [](int n) { return cv::getOptimalDFTSize((n + 31) / 32 * 32); };
+            return cv::Size(round_up(map.width + source_map.width),
+                            round_up(map.height + source_map.height));
+        };
+        std::vector<DirectionMap> source_maps;
+        std::vector<cv::Size> sizes;
+        for (const Pinhole& source : hypothesis.sources) {
+            source_maps.push_back(map_for(source, step));
+            sizes.push_back(transform_size(source_maps.back()));
+        }
+        std::vector<cv::Size> distinct = sizes;
+        const auto less = [](const cv::Size& a, const cv::Size& b) {
+            return std::tie(a.width, a.height) < std::tie(b.width, b.height);
+        };
+        std::sort(distinct.begin(), distinct.end(), less);
+        distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+        std::vector<CameraSpectra> reference_spectra(distinct.size());
+        parallel_ranges(static_cast<int>(distinct.size()), num_threads, [&](int begin, int end) {
+            for (int i = begin; i < end; ++i)
+                reference_spectra[i] =
+                    camera_spectra(reduced, map, camera, Eigen::Matrix3d::Identity(), distinct[i]);
+        });
+        parallel_each(static_cast<int>(hypothesis.sources.size()), num_threads, [&](int s) {
+            // One source pixel a map pixel: finer would alias.
+            const Pinhole& source = hypothesis.sources[s];
+            const std::vector<Image> source_reduced = reduced_for(
+                sources, source.fx / source.width * sources[0].width * step);
+            const Pinhole source_camera =
+                source.resized(source_reduced[0].width, source_reduced[0].height);
+            const std::size_t at =
+                std::lower_bound(distinct.begin(), distinct.end(), sizes[s], less) -
+                distinct.begin();
+            for (std::size_t k = 0; k < space.rolls.size(); ++k) {
+                const Eigen::Matrix3d source_from_map =
+                    space.base * Eigen::AngleAxisd(space.rolls[k], Eigen::Vector3d::UnitZ())
+                                     .toRotationMatrix();
+                const CameraSpectra source_spectra = camera_spectra(
+                    source_reduced, source_maps[s], source_camera, source_from_map, sizes[s]);
+                std::vector<Peak> peaks = peaks_of(reference_spectra[at], source_spectra, map,
+                                                   source_maps[s], sizes[s], space);
+                const std::lock_guard<std::mutex> lock(mutex);
+                for (Peak& peak : peaks) {
+                    peak.reference = r;
+                    peak.source = static_cast<std::size_t>(s);
+                    peak.roll = k;
+                    all.push_back(peak);
+                }
+            }
+        });
+    }
+    // Threads append in any order; the order here must not depend on it.
+    std::sort(all.begin(), all.end(), [](const Peak& a, const Peak& b) {
+        if (a.score != b.score) return a.score > b.score;
+        return std::tie(a.reference, a.source, a.roll, a.dx, a.dy) <
+               std::tie(b.reference, b.source, b.roll, b.dx, b.dy);
+    });
+    std::vector<SearchCandidate> kept;
+    for (const Peak& peak : all) {
+        if (static_cast<int>(kept.size()) >= space.candidates) break;
+        SearchCandidate candidate;
+        candidate.rig.reference = space.hypotheses[peak.reference].reference;
+        candidate.rig.source = space.hypotheses[peak.reference].sources[peak.source];
+        candidate.rig.source_from_reference.rotation = Eigen::Quaterniond(
+            space.base *
+            Eigen::AngleAxisd(space.rolls[peak.roll], Eigen::Vector3d::UnitZ())
+                .toRotationMatrix() *
+            rotation_of_shift(peak.dx, peak.dy, steps[peak.reference]));
+        candidate.score = peak.score;
+        candidate.correlation = peak.correlation;
+        candidate.overlap = peak.overlap;
+        const bool known = std::any_of(kept.begin(), kept.end(), [&](const SearchCandidate& k) {
+            return distance(k.rig, candidate.rig) < 0.03;
+        });
+        if (!known) kept.push_back(candidate);
+    }
+    return kept;
+}
+
+}  // namespace xcalib

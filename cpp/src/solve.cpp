@@ -1,0 +1,152 @@
+#include "solve.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <chrono>
+
+#include "nec_cost.hpp"
+#include "parallel.hpp"
+
+namespace xcalib {
+namespace {
+
+// x - x0: Eq. (camera_regularization) once a Huber loss acts on its norm.
+class HoldCost : public ceres::CostFunction {
+   public:
+    explicit HoldCost(std::vector<double> held) : held_(std::move(held)) {
+        mutable_parameter_block_sizes()->push_back(static_cast<int>(held_.size()));
+        set_num_residuals(static_cast<int>(held_.size()));
+    }
+    bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
+        const Eigen::Index size = static_cast<Eigen::Index>(held_.size());
+        Eigen::Map<Eigen::VectorXd>(residuals, size) =
+            Eigen::Map<const Eigen::VectorXd>(x[0], size) -
+            Eigen::Map<const Eigen::VectorXd>(held_.data(), size);
+        if (jacobians && jacobians[0])
+            Eigen::Map<Eigen::MatrixXd>(jacobians[0], size, size).setIdentity();
+        return true;
+    }
+
+   private:
+    std::vector<double> held_;
+};
+
+// Which blocks move in a stage: the paper's frozen sets.
+void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
+            const CalibrationOptions& options) {
+    const bool source_known = options.source_camera.has_value();
+    const bool reference_free = options.optimize_reference && !options.reference_camera;
+    if (stage == 1) {
+        problem.SetManifold(p.quaternion, new PanTiltManifold);
+        problem.SetManifold(p.translation, new ceres::SubsetManifold(3, {2}));
+    } else {
+        problem.SetManifold(p.quaternion, new ceres::QuaternionManifold);
+    }
+    for (double* block : {p.source.center, p.source.skew})
+        if (stage == 1 || source_known) problem.SetParameterBlockConstant(block);
+    if (source_known) problem.SetParameterBlockConstant(p.source.log_f);
+    for (double* block : {p.reference.log_f, p.reference.center, p.reference.skew})
+        if (!reference_free || (stage == 1 && block != p.reference.log_f))
+            problem.SetParameterBlockConstant(block);
+}
+
+
+// Of the free parameters, columns scaled to unit norm: it tells coupled directions, not units.
+double condition_number(ceres::Problem& problem) {
+    std::vector<double*> blocks;
+    problem.GetParameterBlocks(&blocks);
+    ceres::Problem::EvaluateOptions free;
+    for (double* block : blocks)
+        if (!problem.IsParameterBlockConstant(block)) free.parameter_blocks.push_back(block);
+    ceres::CRSMatrix sparse;
+    problem.Evaluate(free, nullptr, nullptr, nullptr, &sparse);
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
+    for (int row = 0; row < sparse.num_rows; ++row)
+        for (int k = sparse.rows[row]; k < sparse.rows[row + 1]; ++k)
+            jacobian(row, sparse.cols[k]) = sparse.values[k];
+    for (Eigen::Index c = 0; c < jacobian.cols(); ++c)
+        if (const double norm = jacobian.col(c).norm(); norm > 0) jacobian.col(c) /= norm;
+    const Eigen::VectorXd values =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(jacobian.transpose() * jacobian)
+            .eigenvalues();
+    return values[values.size() - 1] / std::max(values[0], 1e-300);
+}
+
+}  // namespace
+
+double seconds_now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+NecValue pooled(const Level& level, const Rig& rig, int num_threads) {
+    const Rig at_level = level.rig_at(rig);
+    std::vector<NecValue> values(level.frames.size());
+    parallel_ranges(static_cast<int>(values.size()), num_threads, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) values[i] = evaluate_nec(level.frames[i], at_level);
+    });
+    NecValue sum;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        sum.nec += level.weights[i] * values[i].nec;
+        sum.norm += values[i].norm;
+        sum.aligned += level.weights[i] * values[i].aligned;
+        sum.valid_share += values[i].valid_share / static_cast<double>(values.size());
+    }
+    return sum;
+}
+
+LevelReport solve_level(const Level& level, int stage, double share_limit,
+                        const CalibrationOptions& options, Rig& rig) {
+    const double start = seconds_now();
+    SolverParameters p = solver_from_rig(rig);
+    const SolverParameters held = p;
+    ceres::Problem problem;
+    for (std::size_t i = 0; i < level.frames.size(); ++i)
+        problem.AddResidualBlock(
+            new NecCost(level.frames[i], level.source_width, level.source_height,
+                        level.weights[i], share_limit, options.optimize_reference),
+            nullptr, NecCost::blocks(p));
+    if (stage == 1 && options.prior_weight > 0) {
+        const auto hold = [&](const double* from, int size, double delta, double* block) {
+            problem.AddResidualBlock(
+                new HoldCost(std::vector<double>(from, from + size)),
+                new ceres::ScaledLoss(new ceres::HuberLoss(delta), options.prior_weight,
+                                      ceres::TAKE_OWNERSHIP),
+                block);
+        };
+        hold(held.translation, 3, 0.1, p.translation);
+        hold(held.quaternion, 4, 0.05, p.quaternion);
+    }
+    freeze(problem, p, stage, options);
+
+    ceres::Solver::Options solver;
+    solver.linear_solver_type = ceres::DENSE_QR;
+    solver.max_num_iterations = options.max_iterations;
+    solver.num_threads = resolve_threads(options.num_threads);
+    solver.function_tolerance = getenv("XC_T") ? atof(getenv("XC_T")) : 1e-5;
+    solver.parameter_tolerance = 1e-7;
+    solver.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, &problem, &summary);
+
+    rig = rig_from_solver(p, rig.reference.width, rig.reference.height, rig.source.width,
+                          rig.source.height);
+    LevelReport report;
+    report.factor = level.factor;
+    report.stage = stage;
+    report.width = level.width;
+    report.height = level.height;
+    report.iterations = static_cast<int>(summary.iterations.size());
+    report.initial_cost = summary.initial_cost;
+    report.final_cost = summary.final_cost;
+    report.stopped = summary.message;
+    report.condition_number = condition_number(problem);
+    const NecValue value = pooled(level, rig, options.num_threads);
+    report.nec = value.nec;
+    report.valid_share = value.valid_share;
+    report.seconds = seconds_now() - start;
+    return report;
+}
+
+
+}  // namespace xcalib

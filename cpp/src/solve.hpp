@@ -1,0 +1,19 @@
+// One solve: a stage of the paper at a level of the pyramid.
+#pragma once
+
+#include "working_images.hpp"
+#include "xcalib/calibrate.hpp"
+
+namespace xcalib {
+
+double seconds_now();
+
+// Mean over the pairs, weighted by c_i (the valid share plainly).
+NecValue pooled(const Level& level, const Rig& rig, int num_threads);
+
+// Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and prior,
+// stage 2 everything free. A pair whose valid share falls below `share_limit` is charged for it.
+LevelReport solve_level(const Level& level, int stage, double share_limit,
+                        const CalibrationOptions& options, Rig& rig);
+
+}  // namespace xcalib

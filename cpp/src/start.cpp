@@ -1,0 +1,325 @@
+#include "start.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "parallel.hpp"
+#include "solve.hpp"
+#include "xcalib/search.hpp"
+
+namespace xcalib {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+// A camera of unknown intrinsics but its horizontal field of view.
+Pinhole camera_guess(const ImageView& image, double hfov) {
+    return Pinhole::from_hfov(image.width, image.height, hfov);
+}
+
+SearchSpace search_space(const ImageView& reference, const ImageView& source,
+                         const std::optional<Rig>& initial, const CalibrationOptions& options) {
+    constexpr double kScaleStep = 1.06;
+    constexpr double kRollStep = 4 * kDegree;
+    const bool local = initial && options.search.mode != SearchMode::full;
+    SearchSpace space;
+    space.min_overlap = options.search.min_overlap;
+    space.map_width = options.search.map_width;
+    space.candidates = options.search.candidates;
+
+    std::vector<Pinhole> cameras;
+    if (options.reference_camera) {
+        cameras = {*options.reference_camera};
+    } else if (initial) {
+        cameras = {initial->reference};
+    } else if (options.reference_hfov_deg) {
+        cameras = {camera_guess(reference, *options.reference_hfov_deg * kDegree)};
+    } else {
+        for (double hfov : {40.0, 60.0, 82.0}) cameras.push_back(camera_guess(reference, hfov * kDegree));
+    }
+    for (const Pinhole& camera : cameras) {
+        SearchHypothesis hypothesis{camera, {}};
+        if (options.source_camera) {
+            hypothesis.sources = {*options.source_camera};
+        } else {
+            // Fields of view are compared by their tangents, as focal lengths are.
+            const Pinhole& centre = local ? initial->source : camera;
+            const double ratio = local ? 1.15 : options.search.max_fov_ratio;
+            const double widest = std::tan(60 * kDegree);
+            const int steps = static_cast<int>(std::ceil(std::log(ratio) / std::log(kScaleStep)));
+            for (int i = -steps; i <= steps; ++i) {
+                const double scale = std::pow(ratio, static_cast<double>(i) / steps);
+                const double tangent = scale * std::tan(centre.hfov() / 2);
+                if (tangent > widest) continue;
+                Pinhole guess = camera_guess(source, 2 * std::atan(tangent));
+                if (local) {
+                    guess = initial->source;
+                    guess.fx /= scale;
+                    guess.fy /= scale;
+                }
+                hypothesis.sources.push_back(guess);
+            }
+        }
+        space.hypotheses.push_back(hypothesis);
+    }
+    const double max_roll = (local ? 3.0 : options.search.max_roll_deg) * kDegree;
+    const int rolls = static_cast<int>(std::floor(max_roll / kRollStep + 1e-9));
+    for (int i = -rolls; i <= rolls; ++i) space.rolls.push_back(i * kRollStep);
+    if (local) {
+        space.base = initial->R();
+        space.max_shift = 0.15;
+    }
+    return space;
+}
+
+// Some of the frames are enough to choose among candidates.
+WorkingImages some_frames(const WorkingImages& images, std::size_t count) {
+    if (count >= images.references.size()) return images;
+    // Every k-th: neighbours in the footage look alike.
+    WorkingImages out;
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t k = i * images.references.size() / count;
+        out.references.push_back(images.references[k]);
+        out.sources.push_back(images.sources[k]);
+        out.depths.push_back(images.depths[k]);
+    }
+    return out;
+}
+
+// What candidates are compared by: edges that agree in direction beyond chance, and over how much
+// of the image. Chance grows as the overlap shrinks.
+double merit(const NecValue& value) { return value.aligned * std::sqrt(value.valid_share); }
+
+struct Candidate {
+    Rig rig;
+    double merit = 0.0;
+    double share_limit = 0.0;
+    std::size_t entry = 0;  // in the report
+    std::vector<LevelReport> levels;
+};
+
+// Inverse depth where the reference has edges: 10th, 50th and 90th percentile [1/m].
+struct InverseDepths {
+    double low, median, high;
+};
+
+InverseDepths inverse_depths(const Level& level) {
+    std::vector<double> values;
+    for (const NecFrame& frame : level.frames)
+        for (std::size_t i = 0; i < frame.depth.pixels.size(); ++i)
+            if (frame.depth.pixels[i] > 0 && (frame.reference.x[i] != 0 || frame.reference.y[i] != 0))
+                values.push_back(1.0 / frame.depth.pixels[i]);
+    if (values.empty()) return {0.0, 0.0, 0.0};
+    std::sort(values.begin(), values.end());
+    const auto at = [&](double share) { return values[std::size_t(share * (values.size() - 1))]; };
+    return {at(0.1), at(0.5), at(0.9)};
+}
+
+// The same rig moved by `t`, and turned so that the middle of the image at the median depth stays
+// where it is: what the search has found is kept, only the parallax changes.
+Rig with_parallax(const Rig& rig, const Eigen::Vector3d& t, double inverse_depth) {
+    const Eigen::Vector3d seen = rig.R() * Eigen::Vector3d::UnitZ();
+    const Eigen::Quaterniond back =
+        Eigen::Quaterniond::FromTwoVectors(seen + t * inverse_depth, seen);
+    Rig moved = rig;
+    moved.source_from_reference.rotation = (back * rig.source_from_reference.rotation).normalized();
+    moved.source_from_reference.translation = back * t;
+    return moved;
+}
+
+Rig turned(const Rig& rig, const Eigen::Vector3d& rotation) {
+    const Eigen::Quaterniond turn(
+        Eigen::AngleAxisd(rotation.norm(), rotation.norm() > 0 ? Eigen::Vector3d(rotation.normalized())
+                                                               : Eigen::Vector3d::UnitZ()));
+    Rig out = rig;
+    out.source_from_reference.rotation = (turn * rig.source_from_reference.rotation).normalized();
+    out.source_from_reference.translation = turn * rig.t();
+    return out;
+}
+
+// The same rig with a reference of another focal length: the source's follows, so that the scale
+// stays, and rotation and translation, so that the middle of the image and its parallax do.
+Rig with_reference_focal(const Rig& rig, double factor) {
+    Rig out = rig;
+    out.reference.fx *= factor;
+    out.reference.fy *= factor;
+    out.source.fx *= factor;
+    out.source.fy *= factor;
+    const Eigen::AngleAxisd rotation(rig.source_from_reference.rotation);
+    const Eigen::Vector3d vector = rotation.angle() * rotation.axis();
+    // Roll is an angle in the image; pan and tilt are displacements over the focal length.
+    const Eigen::Vector3d scaled(vector.x() / factor, vector.y() / factor, vector.z());
+    out.source_from_reference.rotation = Eigen::Quaterniond::Identity();
+    out = turned(out, scaled);
+    out.source_from_reference.translation = rig.t() / factor;
+    return out;
+}
+
+// Replaces the candidate's rig by the best of `count` variants, if any is better than it.
+template <class Variant>
+void choose_best(const Level& level, int num_threads, int count, const Variant& variant,
+                 Candidate& candidate) {
+    std::vector<double> merits(count);
+    parallel_ranges(count, num_threads, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) merits[i] = merit(pooled(level, variant(i), 1));
+    });
+    const int best =
+        static_cast<int>(std::max_element(merits.begin(), merits.end()) - merits.begin());
+    if (merits[best] <= candidate.merit) return;
+    const Rig chosen = variant(best);
+    candidate.merit = merits[best];
+    candidate.rig = chosen;
+}
+
+// The search sees one displacement for all depths, at coarse steps of scale and roll. This looks
+// for the baseline that goes with it, and for what the search has rounded, on grids in turn whose
+// steps are about a pixel of the level.
+void place(const Level& level, bool free_focal, const CalibrationOptions& options,
+           Candidate& candidate) {
+    const InverseDepths inverse = inverse_depths(level);
+    const double f = level.rig_at(candidate.rig).source.fx;
+    const double half = 0.5 * level.width * f / level.rig_at(candidate.rig).reference.fx;
+    candidate.merit = merit(pooled(level, candidate.rig, options.num_threads));
+    for (int round = 0; round < 2; ++round) {
+        if (const double spread = f * (inverse.high - inverse.low); spread > 0) {
+            const double step = 1.5 / spread;
+            constexpr int kReachX = 6, kReachY = 4;  // baselines are mostly level
+            const Rig& from = candidate.rig;
+            choose_best(
+                level, options.num_threads, (2 * kReachX + 1) * (2 * kReachY + 1),
+                [&](int i) {
+                    const int x = i % (2 * kReachX + 1) - kReachX, y = i / (2 * kReachX + 1) - kReachY;
+                    return with_parallax(from, Eigen::Vector3d(x * step, y * step, 0),
+                                         inverse.median);
+                },
+                candidate);
+        }
+        if (free_focal) {
+            const Rig from = candidate.rig;
+            constexpr int kFocals = 9;  // horizontal fields of view of 28 to 95 deg
+            choose_best(
+                level, options.num_threads, kFocals,
+                [&](int i) {
+                    const double focal = from.reference.width * 2.0 * std::pow(0.6875, i * 0.5);
+                    return with_reference_focal(from, focal / from.reference.fx);
+                },
+                candidate);
+        }
+        constexpr int kReach = 3;
+        const int side = 2 * kReach + 1;
+        const Rig before = candidate.rig;
+        choose_best(
+            level, options.num_threads, side * side,
+            [&](int i) {  // scale and roll
+                Rig rig = before;
+                if (!options.source_camera) {
+                    const double scale = 1 + (i % side - kReach) / half;
+                    rig.source.fx *= scale;
+                    rig.source.fy *= scale;
+                }
+                return turned(rig, Eigen::Vector3d(0, 0, (i / side - kReach) / half));
+            },
+            candidate);
+        const Rig after = candidate.rig;
+        choose_best(
+            level, options.num_threads, side * side,
+            [&](int i) {  // pan and tilt
+                return turned(after, Eigen::Vector3d((i / side - kReach) / f, (i % side - kReach) / f, 0));
+            },
+            candidate);
+    }
+}
+
+// Keeps the best `count`, best first.
+void keep_best(std::vector<Candidate>& candidates, std::size_t count) {
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.merit > b.merit; });
+    if (candidates.size() > count) candidates.resize(count);
+}
+
+}  // namespace
+
+std::vector<Step> schedule(int width, int height) {
+    constexpr int kSmallestSide = 40;
+    std::vector<Step> steps;
+    for (int factor : {8, 4})
+        if (std::min(width, height) / factor >= kSmallestSide) steps.push_back({factor, 1});
+    for (int factor : {4, 2, 1})
+        if (std::min(width, height) / factor >= kSmallestSide || factor == 1)
+            steps.push_back({factor, 2});
+    return steps;
+}
+Start find_start(const WorkingImages& all_images, const ImageView& reference,
+                 const ImageView& source, const std::optional<Rig>& initial,
+                 const CalibrationOptions& options, const std::function<void(double)>& progress) {
+    constexpr std::size_t kFrames = 16;
+    const WorkingImages images = some_frames(all_images, kFrames);
+    const int num_threads = options.num_threads;
+    const double start = seconds_now();
+    Start out;
+
+    std::vector<SearchCandidate> found;
+    const bool searches = options.search.mode != SearchMode::off;
+    if (searches) {
+        found = global_search(images.references, images.sources,
+                              search_space(reference, source, initial, options), num_threads);
+    } else {
+        SearchCandidate given;
+        given.rig.reference = options.reference_camera.value_or(
+            initial ? initial->reference
+                    : camera_guess(reference, options.reference_hfov_deg.value_or(45) * kDegree));
+        given.rig.source = options.source_camera.value_or(
+            initial ? initial->source : camera_guess(source, 45 * kDegree));
+        if (initial)
+            given.rig.source_from_reference.rotation = initial->source_from_reference.rotation;
+        found = {given};
+    }
+    if (found.empty())
+        throw std::runtime_error("the search found no displacement at which the images overlap");
+    out.search_seconds = seconds_now() - start;
+    progress(0.4);
+
+    const std::vector<Step> steps = schedule(images.references[0].width, images.references[0].height);
+    std::vector<Candidate> candidates;
+    for (const SearchCandidate& peak : found) {
+        CandidateReport entry;
+        entry.found = peak.rig;
+        entry.score = peak.score;
+        entry.correlation = peak.correlation;
+        entry.overlap = peak.overlap;
+        Candidate candidate;
+        candidate.rig = peak.rig;
+        candidate.entry = out.candidates.size();
+        if (initial) candidate.rig.source_from_reference.translation = initial->t();
+        const Level level = make_level(images, steps[0].factor, candidate.rig, num_threads);
+        if (searches && !initial) place(level, !options.reference_camera && !options.reference_hfov_deg && !options.source_camera, options, candidate);
+        candidate.share_limit = 0.8 * pooled(level, candidate.rig, num_threads).valid_share;
+        candidates.push_back(candidate);
+        out.candidates.push_back(entry);
+    }
+    progress(0.5);
+
+    // Halving: each level costs four times the last, and tells more.
+    for (std::size_t s = 0; s + 1 < steps.size() || s == 0; ++s) {
+        if (s > 0 && steps[s].factor == 1) break;
+        if (s == 0 || steps[s].factor != steps[s - 1].factor)
+            keep_best(candidates, steps[s].factor > 4 ? 8 : steps[s].factor > 2 ? 5 : 2);
+        for (Candidate& candidate : candidates) {
+            const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
+            candidate.levels.push_back(solve_level(level, steps[s].stage, candidate.share_limit,
+                                                   options, candidate.rig));
+            candidate.merit = merit(pooled(level, candidate.rig, num_threads));
+            out.candidates[candidate.entry].refined = candidate.rig;
+            out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;
+        }
+        progress(0.5 + 0.5 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
+    }
+    keep_best(candidates, 1);
+    out.rig = candidates[0].rig;
+    out.levels = candidates[0].levels;
+    return out;
+}
+
+}  // namespace xcalib

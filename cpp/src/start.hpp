@@ -1,0 +1,35 @@
+// Where a calibration starts: the global search, and the choice among what it finds.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "working_images.hpp"
+#include "xcalib/calibrate.hpp"
+
+namespace xcalib {
+
+// One step of the schedule: the paper's stage at a level of the pyramid.
+struct Step {
+    int factor;
+    int stage;
+};
+
+// Stage 1 holds at the coarse levels, where the dominant parameters are found, and everything is
+// free from there on. Levels too small to have edges are left out, but for the finest.
+std::vector<Step> schedule(int width, int height);
+
+struct Start {
+    Rig rig;
+    std::vector<CandidateReport> candidates;
+    std::vector<LevelReport> levels;  // that led to `rig`
+    double search_seconds = 0.0;
+};
+
+// `reference` and `source` give the sizes of the cameras.
+Start find_start(const WorkingImages& images, const ImageView& reference, const ImageView& source,
+                 const std::optional<Rig>& initial, const CalibrationOptions& options,
+                 const std::function<void(double)>& progress);
+
+}  // namespace xcalib

@@ -1,0 +1,155 @@
+#include "working_images.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "parallel.hpp"
+
+namespace xcalib {
+namespace {
+
+// Camera optics blur by about this much already; bilinear sampling needs it to be smooth. [px]
+constexpr double kBlur = 0.8;
+
+std::string size_text(const ImageView& view) {
+    return std::to_string(view.width) + "x" + std::to_string(view.height);
+}
+
+void require_one_size(const char* name, const std::vector<ImageView>& views) {
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const std::string frame = std::string(name) + " frame " + std::to_string(i);
+        if (views[i].width < 32 || views[i].height < 32)
+            throw std::invalid_argument(frame + " is " + size_text(views[i]) +
+                                        ", expected at least 32x32");
+        if (views[i].width != views[0].width || views[i].height != views[0].height)
+            throw std::invalid_argument(frame + " is " + size_text(views[i]) + ", expected " +
+                                        size_text(views[0]) + " as in frame 0");
+    }
+}
+
+// Passes an error on with the frame that it belongs to.
+template <class Work>
+void for_frame(const char* name, int index, const Work& work) {
+    try {
+        work();
+    } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(std::string(name) + " frame " + std::to_string(index) + ": " +
+                                    error.what());
+    }
+}
+
+// Depth without its edges: across one, the warp shows a surface beside another that the source
+// camera may not see there at all, and the step between them moves with the depth, not the rig.
+Image without_depth_edges(const Image& depth) {
+    constexpr float kEdge = 1.1f;
+    Image out = depth;
+    for (int y = 0; y < depth.height; ++y)
+        for (int x = 0; x < depth.width; ++x) {
+            const float here = depth.row(y)[x];
+            for (int v = std::max(0, y - 1); v <= std::min(depth.height - 1, y + 1); ++v)
+                for (int u = std::max(0, x - 1); u <= std::min(depth.width - 1, x + 1); ++u) {
+                    const float there = depth.row(v)[u];
+                    if (there > 0 && (there > here * kEdge || there * kEdge < here))
+                        out.row(y)[x] = 0.0f;
+                }
+        }
+    return out;
+}
+
+// At coarser levels nearly everything is near a depth edge, and a pixel's width matters less.
+constexpr int kFinest = 2;
+
+}  // namespace
+
+void validate_frames(const std::vector<ImageView>& references,
+                     const std::vector<ImageView>& sources,
+                     const std::vector<ImageView>& depths) {
+    if (references.empty()) throw std::invalid_argument("no image pairs were given, expected at least 1");
+    if (references.size() != sources.size() || references.size() != depths.size())
+        throw std::invalid_argument(
+            "got " + std::to_string(references.size()) + " references, " +
+            std::to_string(sources.size()) + " sources and " + std::to_string(depths.size()) +
+            " depth maps, expected as many of each");
+    require_one_size("reference", references);
+    require_one_size("source", sources);
+    for (std::size_t i = 0; i < depths.size(); ++i)
+        for_frame("depth", static_cast<int>(i), [&] {
+            require_same_aspect("size", depths[i].width, depths[i].height, references[0].width,
+                                references[0].height);
+        });
+}
+
+WorkingImages make_working_images(const std::vector<ImageView>& references,
+                                  const std::vector<ImageView>& sources,
+                                  const std::vector<ImageView>& depths,
+                                  const std::vector<int>& chosen, int working_width,
+                                  int num_threads) {
+    const int reduction = (references[0].width + working_width - 1) / working_width;
+    const int width = static_cast<int>(std::lround(references[0].width / double(reduction)));
+    const int height = static_cast<int>(std::lround(references[0].height / double(reduction)));
+    WorkingImages images;
+    images.references.resize(chosen.size());
+    images.sources.resize(chosen.size());
+    images.depths.resize(chosen.size());
+    parallel_ranges(static_cast<int>(chosen.size()), num_threads, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) {
+            const int frame = chosen[i];
+            for_frame("reference", frame, [&] {
+                images.references[i] =
+                    normalize_dark(resize_area(to_gray(references[frame]), width, height));
+            });
+            for_frame("source", frame,
+                      [&] { images.sources[i] = normalize_percentiles(to_gray(sources[frame])); });
+            for_frame("depth", frame, [&] {
+                images.depths[i] = resize_depth(clean_depth(depths[frame]), width, height);
+                const auto& d = images.depths[i].pixels;
+                if (std::none_of(d.begin(), d.end(), [](float z) { return z > 0; }))
+                    throw std::invalid_argument(
+                        "no depth is known, expected finite metres > 0 in some pixels");
+            });
+        }
+    });
+    return images;
+}
+
+Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads) {
+    Level level;
+    level.factor = factor;
+    const Image& reference = images.references[0];
+    const Image& source = images.sources[0];
+    level.width = std::max(1, static_cast<int>(std::lround(reference.width / double(factor))));
+    level.height = std::max(1, static_cast<int>(std::lround(reference.height / double(factor))));
+    // Source pixels to a reference pixel of this level: more are averaged first (they would
+    // alias), fewer mean that the reference is finer than its partner, and is blurred to match.
+    const double density = (rig.source.fx / rig.source.width * source.width) /
+                           (rig.reference.fx / rig.reference.width * level.width);
+    const double shrink = std::max(1.0, density);
+    level.source_width = std::max(8, static_cast<int>(std::lround(source.width / shrink)));
+    level.source_height = std::max(8, static_cast<int>(std::lround(source.height / shrink)));
+    const double reference_blur = kBlur * std::max(1.0, 1 / density);
+    const Rig at_level = level.rig_at(rig);
+    const int count = static_cast<int>(images.references.size());
+    level.frames.resize(count);
+    level.weights.resize(count);
+    parallel_ranges(count, num_threads, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) {
+            const Image depth = resize_depth(images.depths[i], level.width, level.height);
+            level.frames[i] = make_nec_frame(
+                gaussian_blur(resize_area(images.references[i], level.width, level.height),
+                              reference_blur),
+                gaussian_blur(
+                    resize_area(images.sources[i], level.source_width, level.source_height),
+                    kBlur),
+                factor <= kFinest ? without_depth_edges(depth) : depth, at_level);
+            level.weights[i] = evaluate_nec(level.frames[i], at_level).norm;
+        }
+    });
+    const double sum = std::accumulate(level.weights.begin(), level.weights.end(), 0.0);
+    for (double& weight : level.weights) weight = sum > 0 ? weight / sum : 1.0 / count;
+    return level;
+}
+
+}  // namespace xcalib

@@ -1,0 +1,39 @@
+// The caller's frames as the calibration works on them, and their pyramid.
+#pragma once
+
+#include <vector>
+
+#include "xcalib/calibrate.hpp"
+#include "xcalib/nec.hpp"
+
+namespace xcalib {
+
+struct WorkingImages {
+    std::vector<Image> references;  // gray, normalized, reduced by a whole factor
+    std::vector<Image> sources;     // gray, normalized, as large as given
+    std::vector<Image> depths;      // on the reference's grid
+};
+
+// Checks what was given, and throws naming the frame by its index in the caller's lists.
+void validate_frames(const std::vector<ImageView>& references,
+                     const std::vector<ImageView>& sources, const std::vector<ImageView>& depths);
+
+WorkingImages make_working_images(const std::vector<ImageView>& references,
+                                  const std::vector<ImageView>& sources,
+                                  const std::vector<ImageView>& depths,
+                                  const std::vector<int>& chosen, int working_width,
+                                  int num_threads);
+
+// One level of the pyramid, made for the scale between the cameras that `rig` has.
+struct Level {
+    int factor = 1;
+    int width = 0, height = 0;                // of the reference
+    int source_width = 0, source_height = 0;
+    std::vector<NecFrame> frames;
+    std::vector<double> weights;              // c_i / sum c_i at `rig`
+
+    Rig rig_at(const Rig& rig) const { return rig.resized(width, height, source_width, source_height); }
+};
+Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
+
+}  // namespace xcalib

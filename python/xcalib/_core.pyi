@@ -1,0 +1,367 @@
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import Any
+
+from numpy import float32, float64, uint8
+from numpy.typing import ArrayLike, NDArray
+
+class Pinhole:
+    """A pinhole camera, Eq. (intrinsic) of the paper.
+
+    Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.
+    """
+
+    width: int
+    """[px]"""
+    height: int
+    """[px]"""
+    fx: float
+    """[px]"""
+    fy: float
+    """[px]"""
+    cx: float
+    """[px]"""
+    cy: float
+    """[px]"""
+    skew: float
+    """[px]"""
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        fx: float,
+        fy: float,
+        cx: float,
+        cy: float,
+        skew: float = 0.0,
+    ) -> None:
+        """Raises ValueError where a size is below 1, a focal length not > 0, or a value not
+        finite.
+        """
+    @staticmethod
+    def from_hfov(width: int, height: int, hfov_deg: float) -> Pinhole:
+        """Square pixels and the principal point at the centre; hfov_deg in (0, 180)."""
+    @property
+    def K(self) -> NDArray[float64]:
+        """(3, 3) float64 intrinsic matrix [px]."""
+    @property
+    def hfov_deg(self) -> float:
+        """Horizontal field of view, 2 atan(width / (2 fx)) [deg]."""
+    @property
+    def vfov_deg(self) -> float:
+        """Vertical field of view [deg]."""
+    def resized(self, width: int, height: int) -> Pinhole:
+        """The same camera behind an image of another size [px]."""
+
+class Rig:
+    """A reference and a source camera, fixed to each other.
+
+    `R` and `t` take points of the reference camera to the source camera: X_S = R X_R + t.
+    """
+
+    reference: Pinhole
+    """Pinhole that gives the pixel grid."""
+    source: Pinhole
+    """Pinhole whose images are registered."""
+    R: NDArray[float64]
+    """(3, 3) float64 rotation, source_from_reference."""
+    t: NDArray[float64]
+    """(3,) float64 translation, source_from_reference [m]."""
+
+    def __init__(
+        self,
+        reference: Pinhole,
+        source: Pinhole,
+        R: ArrayLike | None = None,
+        t: ArrayLike | None = None,
+    ) -> None:
+        """R: (3, 3) rotation, default identity. t: (3,) [m], default zero. ValueError otherwise."""
+    @property
+    def quaternion_wxyz(self) -> NDArray[float64]:
+        """(4,) float64 unit quaternion of R."""
+    @property
+    def infinite_homography(self) -> NDArray[float64]:
+        """(3, 3) float64, K_S R K_R^-1: where points at infinity go."""
+    def resized(
+        self, reference_width: int, reference_height: int, source_width: int, source_height: int
+    ) -> Rig:
+        """The same rig behind images of other sizes [px]."""
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes the rig file, whole or not at all. OSError names the path."""
+    @staticmethod
+    def load(path: str | PathLike[str]) -> Rig:
+        """Reads a rig file. OSError where it cannot be read; ValueError, with the path, the
+        field and what was expected, where it is not a rig.
+        """
+
+class SearchOptions:
+    """The global search that starts a calibration."""
+
+    mode: str
+    """auto (full without an initial rig, local with one), full, local or off."""
+    max_fov_ratio: float
+    """Largest ratio of the two fields of view, either way, in tangents; > 1."""
+    max_roll_deg: float
+    """[deg], in [0, 180]."""
+    min_overlap: float
+    """Geometric mean of the shares of both images' edges, in (0, 1)."""
+    map_width: int
+    """Width searched at [px], >= 32."""
+    candidates: int
+    """Peaks refined before one is chosen, >= 1."""
+
+    def __init__(self, **kwargs: Any) -> None: ...
+
+class CalibrationOptions:
+    """Options of calibrate(). Keyword arguments set fields."""
+
+    max_frames: int
+    """Pairs used, spread over the footage; >= 1."""
+    seed: int
+    """Of the frame choice."""
+    num_threads: int
+    """0 uses every core."""
+    working_width: int
+    """References are reduced by a whole factor to at most this width [px]."""
+    max_iterations: int
+    """Per stage and level; >= 1."""
+    prior_weight: float
+    """gamma of Eq. (total_loss), in stage 1; >= 0."""
+    reference_camera: Pinhole | None
+    """Known intrinsics, frozen, or None."""
+    source_camera: Pinhole | None
+    """Known intrinsics, frozen, or None."""
+    reference_hfov_deg: float | None
+    """Horizontal field of view to assume [deg], or None to search it."""
+    optimize_reference: bool
+    """Free the reference's intrinsics too; they are coupled with the source's."""
+    search: SearchOptions
+    """SearchOptions."""
+
+    def __init__(self, **kwargs: Any) -> None: ...
+    def validate(self) -> None:
+        """Raises ValueError naming the field, its value and the allowed range."""
+
+class LevelReport:
+    """One solve: a stage at a level of the pyramid."""
+    @property
+    def factor(self) -> int:
+        """Reduction of the working images."""
+    @property
+    def stage(self) -> int:
+        """1 or 2, as in the paper."""
+    @property
+    def width(self) -> int:
+        """[px]"""
+    @property
+    def height(self) -> int:
+        """[px]"""
+    @property
+    def iterations(self) -> int:
+        """Of Levenberg-Marquardt."""
+    @property
+    def initial_cost(self) -> float:
+        """Eq. (image_loss), and the prior in stage 1."""
+    @property
+    def final_cost(self) -> float:
+        """The same at the end."""
+    @property
+    def nec(self) -> float:
+        """Mean over the pairs, weighted by c_i."""
+    @property
+    def valid_share(self) -> float:
+        """Share of the reference's edge energy that the source covers."""
+    @property
+    def condition_number(self) -> float:
+        """Of the normal equations, columns scaled to unit norm."""
+    @property
+    def seconds(self) -> float:
+        """[s]"""
+    @property
+    def stopped(self) -> str:
+        """Why it stopped."""
+
+class CandidateReport:
+    """A peak of the search, and what became of it."""
+    @property
+    def score(self) -> float:
+        """Contrast against the typical value."""
+    @property
+    def correlation(self) -> float:
+        """Pooled over the frames, of doubled angles, in [-1, 1]."""
+    @property
+    def overlap(self) -> float:
+        """Of both images' edges."""
+    @property
+    def refined_nec(self) -> float:
+        """After the coarse levels."""
+    @property
+    def found(self) -> Rig:
+        """Rig, by the search."""
+    @property
+    def refined(self) -> Rig:
+        """Rig, after the coarse levels."""
+
+class CalibrationReport:
+    """How a calibration went."""
+    @property
+    def converged(self) -> bool:
+        """Is the rig to be trusted?"""
+    @property
+    def message(self) -> str:
+        """Why, in one line."""
+    @property
+    def seconds(self) -> float:
+        """[s]"""
+    @property
+    def search_seconds(self) -> float:
+        """[s]"""
+    @property
+    def working_width(self) -> int:
+        """[px]"""
+    @property
+    def working_height(self) -> int:
+        """[px]"""
+    @property
+    def nec(self) -> float:
+        """At the finest level."""
+    @property
+    def baseline_nec(self) -> float:
+        """Typical of rigs displaced by many pixels."""
+    @property
+    def valid_share(self) -> float:
+        """Of the reference's edge energy."""
+    @property
+    def frames(self) -> list[int]:
+        """Indices of the pairs used."""
+    @property
+    def candidates(self) -> list[CandidateReport]:
+        """Of the search, best score first."""
+    @property
+    def levels(self) -> list[LevelReport]:
+        """In the order solved."""
+    def brief(self) -> str:
+        """One line."""
+    def full(self) -> str:
+        """A table."""
+    def to_dict(self) -> dict[str, Any]:
+        """Plain lists and numbers, as for JSON."""
+
+class CalibrationResult:
+    """What calibrate() returns."""
+    @property
+    def rig(self) -> Rig:
+        """The best rig found."""
+    @property
+    def converged(self) -> bool:
+        """Is it to be trusted?"""
+    @property
+    def report(self) -> CalibrationReport:
+        """CalibrationReport."""
+
+def choose_frames(count: int, max_frames: int, seed: int) -> list[int]:
+    """Indices of max_frames of count frames, spread over all, drawn with seed; sorted."""
+
+def calibrate(
+    references: Sequence[NDArray[Any]],
+    sources: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    initial: Rig | None = None,
+    options: CalibrationOptions = ...,
+    progress: Callable[[str, float], object] | None = None,
+) -> CalibrationResult:
+    """Estimates the rig from footage and depth, without a target.
+
+    references, sources: sequences of (H, W) or (H, W, 3) uint8 | uint16 | float32 images,
+    pairs by index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN /
+    inf unknown. initial: Rig to start from. progress: called with (stage, share of the work
+    done). Images are copied only where their rows are not contiguous.
+
+    Raises ValueError, naming the frame, on unusable input. Not to converge is a result: see
+    CalibrationResult.converged.
+    """
+
+class Registrar:
+    """One rig, a stream of frames, Eq. (warping).
+
+    num_threads: 0 uses every core. Raises ValueError where the rig is not valid.
+    """
+    def __init__(self, rig: Rig, num_threads: int = 0) -> None: ...
+    @property
+    def rig(self) -> Rig:
+        """A copy of the rig."""
+    def map(self, depth: NDArray[Any]) -> NDArray[float32]:
+        """(H, W, 2) float32: x and y in the source image [px] of each reference pixel, NaN where
+        it has none. depth: (h, w) float32 [m] of the reference's aspect.
+        """
+    def register(
+        self, source: NDArray[Any], depth: NDArray[Any]
+    ) -> tuple[NDArray[Any], NDArray[uint8]]:
+        """The source on the reference grid, and what each pixel is worth.
+
+        source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth:
+        (h, w) float32 [m] of the reference's aspect. Returns (image, mask): image (H, W[, 3])
+        in the source's dtype, 0 where not valid; mask (H, W) uint8: 0 valid, 1 outside the
+        source, 2 occluded, 3 no depth. Raises ValueError with shapes and dtypes.
+        """
+
+def nec(
+    reference: NDArray[Any],
+    registered: NDArray[Any],
+    mask: NDArray[Any] | None = None,
+    floor: str = "none",
+) -> float:
+    """Normalized Edge Correlation, Eq. (nec), in [0, 1]; NaN where no edge is left.
+
+    Images (H, W) or (H, W, 3) of one size; mask (H, W), nonzero where valid. floor: "none"
+    (upper clamp only, as the authors' code) or "printed" (Eq. (gradient_clamping) as
+    printed).
+    """
+
+def gc(
+    reference: NDArray[Any], registered: NDArray[Any], mask: NDArray[Any] | None = None
+) -> float:
+    """Gradient correlation: mean over x and y of the zero-mean normalized correlation of the
+    absolute forward differences, in [-1, 1]. Images and mask as in nec().
+    """
+
+def ncc(
+    reference: NDArray[Any], registered: NDArray[Any], mask: NDArray[Any] | None = None
+) -> float:
+    """Zero-mean normalized cross correlation, in [-1, 1]. Images and mask as in nec()."""
+
+def rmse(
+    reference: NDArray[Any], registered: NDArray[Any], mask: NDArray[Any] | None = None
+) -> float:
+    """Root mean square error of gray values; integers scaled to [0, 1]. Images and mask as in
+    nec().
+    """
+
+def ssim(
+    reference: NDArray[Any],
+    registered: NDArray[Any],
+    mask: NDArray[Any] | None = None,
+    data_range: float | None = None,
+) -> float:
+    """Structural similarity (Wang et al. 2004), Gaussian window of sigma 1.5 px, over pixels
+    whose 11 x 11 window is valid. data_range: span of the gray values, 1 by default. Images
+    and mask as in nec().
+    """
+
+def psnr(
+    reference: NDArray[Any],
+    registered: NDArray[Any],
+    mask: NDArray[Any] | None = None,
+    data_range: float | None = None,
+) -> float:
+    """Peak signal-to-noise ratio [dB], 20 log10(data_range / RMSE). Images, mask and data_range
+    as in ssim().
+    """
+
+def patch_shifts(
+    reference: NDArray[Any], registered: NDArray[Any], mask: NDArray[Any] | None = None
+) -> NDArray[float32]:
+    """(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches that tell; see
+    metrics.patch_residual().
+    """

@@ -1,0 +1,525 @@
+"""The ``xcalib`` command.
+
+Results go to stdout, progress and errors to stderr. Exit codes: 0 done and trusted, 1 failed,
+2 wrong usage or input, 3 done, but the result is not to be trusted.
+"""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import click
+
+from ._core import CalibrationOptions, Pinhole, Rig
+from .demo import run_demo
+from .depth import PNG_SCALE, PlaneDepth
+from .evaluate import evaluate
+from .frames import (
+    Image,
+    InputError,
+    check_file_writable,
+    check_folder_writable,
+    size_of,
+    write_bytes,
+)
+from .inspection import as_lines, describe
+from .pipeline import Frames, progress, run_calibration, run_registration, save_rig
+
+FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
+DEFAULTS = CalibrationOptions()
+SEED = click.IntRange(0, 2**32 - 1)
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+# -- Errors --------------------------------------------------------------------------------------
+
+
+def stop(code: int, message: str) -> NoReturn:
+    """End the command with one line on stderr."""
+    label = "not to be trusted" if code == NOT_TRUSTED else "error"
+    click.echo(f"{label}: {' '.join(message.split())}", err=True)
+    sys.exit(code)
+
+
+class Commands(click.Group):
+    """A group that turns every expected exception into one line and an exit code."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (click.exceptions.Exit, click.exceptions.Abort):
+            raise  # these are click's own control flow, and RuntimeErrors
+        except click.ClickException as error:
+            stop(WRONG_INPUT, error.format_message())
+        except KeyboardInterrupt:
+            stop(FAILED, "interrupted")
+        except OSError as error:
+            if error.errno == errno.EPIPE:
+                raise  # the reader of our output left: click ends quietly
+            named = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+            stop(WRONG_INPUT, named)
+        except ValueError as error:
+            stop(WRONG_INPUT, str(error))
+        except (RuntimeError, MemoryError) as error:
+            stop(FAILED, str(error) or "out of memory")
+
+
+# -- Arguments that commands share ---------------------------------------------------------------
+
+
+def intrinsics(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[float, float, float, float] | None:
+    """Parse ``FX,FY,CX,CY`` in pixels."""
+    if value is None:
+        return None
+    try:
+        fx, fy, cx, cy = (float(part) for part in value.split(","))
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is not four numbers FX,FY,CX,CY") from None
+    if not (fx > 0 and fy > 0 and all(map(math.isfinite, (fx, fy, cx, cy)))):
+        raise click.BadParameter(f"{value!r}: expected finite numbers, FX and FY above 0 px")
+    return fx, fy, cx, cy
+
+
+def options(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    """Several click decorators as one."""
+
+    def apply(command: Command) -> Command:
+        for decorator in reversed(decorators):
+            command = decorator(command)
+        return command
+
+    return apply
+
+
+def number(
+    flag: str, metavar: str, default: float, text: str, shown: bool | str = True
+) -> Callable[[Command], Command]:
+    """An option that takes a number, with its unit in the help text."""
+    return click.option(
+        flag, metavar=metavar, type=float, default=default, show_default=shown, help=text
+    )
+
+
+frames_arguments = options(
+    click.argument("reference", type=click.Path(path_type=Path)),
+    click.argument("source", type=click.Path(path_type=Path)),
+    click.option(
+        "--depth",
+        "depth_spec",
+        metavar="DEPTH",
+        required=True,
+        help="Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr in m;"
+        " 0 unknown), or `plane` for a flat road.",
+    ),
+    number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256"),
+    number(
+        "--camera-height",
+        "M",
+        PlaneDepth.camera_height,
+        "Plane: height of the reference camera above the road [m].",
+    ),
+    number(
+        "--horizon",
+        "F",
+        PlaneDepth.horizon,
+        "Plane: row of the horizon [fraction of the image height from the top].",
+    ),
+    number("--far", "M", PlaneDepth.far, "Plane: largest depth, at and above the horizon too [m]."),
+    number(
+        "--plane-hfov",
+        "DEG",
+        PlaneDepth.hfov_deg,
+        "Plane: horizontal field of view of the reference camera [deg].",
+    ),
+)
+quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
+threads_option = click.option(
+    "--threads",
+    type=click.IntRange(min=0),
+    default=DEFAULTS.num_threads,
+    show_default=True,
+    help="Threads to use; 0 means all cores.",
+)
+rig_argument = click.argument("rig_file", metavar="RIG", type=click.Path(path_type=Path))
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(version("xcalib-rgbt"), prog_name="xcalib")
+def cli() -> None:
+    """Calibrate a fixed pair of cameras, visible and thermal, and register their frames.
+
+    REFERENCE and SOURCE are folders of images (8 or 16 bit, any size), paired by name.
+
+    Exit codes: 0 done and trusted, 1 failed, 2 wrong usage or input, 3 done, but the result is
+    not to be trusted.
+    """
+
+
+# -- calibrate -----------------------------------------------------------------------------------
+
+
+@cli.command("calibrate")
+@frames_arguments
+@click.option(
+    "-o",
+    "--output",
+    metavar="RIG",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Rig file to write (YAML).",
+)
+@click.option(
+    "--frames",
+    "max_frames",
+    metavar="N",
+    type=click.IntRange(min=1),
+    default=DEFAULTS.max_frames,
+    show_default=True,
+    help="Frames to use at most, drawn by the seed.",
+)
+@click.option(
+    "--seed",
+    metavar="N",
+    type=SEED,
+    default=DEFAULTS.seed,
+    show_default=True,
+    help="Seed of the frame choice.",
+)
+@threads_option
+@click.option(
+    "--initial",
+    metavar="RIG",
+    type=click.Path(path_type=Path),
+    help="Rig file to start from.  [default: none, searched]",
+)
+@click.option(
+    "--search",
+    type=click.Choice(["auto", "full", "local", "off"]),
+    default=DEFAULTS.search.mode,
+    show_default=True,
+    help="Global search before refinement: full, local (around the initial rig), off, or auto.",
+)
+@click.option(
+    "--reference-intrinsics",
+    metavar="FX,FY,CX,CY",
+    callback=intrinsics,
+    help="Known intrinsics of the reference camera, kept [px].  [default: none]",
+)
+@click.option(
+    "--source-intrinsics",
+    metavar="FX,FY,CX,CY",
+    callback=intrinsics,
+    help="Known intrinsics of the source camera, kept [px].  [default: none, estimated]",
+)
+@click.option(
+    "--reference-hfov",
+    metavar="DEG",
+    type=click.FloatRange(0, 180, min_open=True, max_open=True),
+    default=DEFAULTS.reference_hfov_deg,
+    show_default="searched" if DEFAULTS.reference_hfov_deg is None else True,
+    help="Horizontal field of view of the reference camera at the start [deg].",
+)
+@click.option(
+    "--optimize-reference",
+    is_flag=True,
+    default=DEFAULTS.optimize_reference,
+    help="Estimate the reference intrinsics too.  [default: kept]",
+)
+@click.option(
+    "--working-width",
+    metavar="PX",
+    type=click.IntRange(min=1),
+    default=DEFAULTS.working_width,
+    show_default=True,
+    help="Reference width that calibration works at [px].",
+)
+@click.option(
+    "--report",
+    "report_file",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Also write the full report (JSON), for `xcalib report`.",
+)
+@quiet_option
+def calibrate_command(
+    output: Path,
+    max_frames: int,
+    seed: int,
+    threads: int,
+    initial: Path | None,
+    search: str,
+    reference_intrinsics: tuple[float, float, float, float] | None,
+    source_intrinsics: tuple[float, float, float, float] | None,
+    reference_hfov: float | None,
+    optimize_reference: bool,
+    working_width: int,
+    report_file: Path | None,
+    quiet: bool,
+    **inputs: Any,
+) -> None:
+    """Estimate both cameras and their pose, and write a rig file.
+
+    The rig is written even if it is not to be trusted (exit code 3).
+    """
+    if reference_intrinsics and (reference_hfov or optimize_reference):
+        raise click.UsageError(
+            "--reference-intrinsics are kept; expected no --reference-hfov or"
+            " --optimize-reference with them"
+        )
+    calibration = CalibrationOptions(
+        max_frames=max_frames,
+        seed=seed,
+        num_threads=threads,
+        working_width=working_width,
+        reference_hfov_deg=reference_hfov,
+        optimize_reference=optimize_reference,
+    )
+    calibration.search.mode = search
+
+    def set_cameras(calibration: CalibrationOptions, reference: Image, source: Image) -> None:
+        if reference_intrinsics:
+            calibration.reference_camera = Pinhole(*size_of(reference), *reference_intrinsics)
+        if source_intrinsics:
+            calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
+
+    initial_rig = Rig.load(initial) if initial else None
+    frames = Frames.open(**inputs)
+    check_file_writable(output)
+    if report_file:
+        check_file_writable(report_file)
+
+    result, chosen = run_calibration(frames, calibration, initial_rig, quiet, set_cameras)
+    save_rig(result.rig, output)
+    click.echo(result.report.brief())
+    click.echo(f"rig: {output}")
+    if report_file:
+        files = [str(frames.references.paths[index]) for index in chosen]
+        document = {"format": "xcalib-report", "version": 1, "rig": str(output), "files": files}
+        write_json(report_file, document | result.report.to_dict())
+        click.echo(f"report: {report_file}")
+    if not result.converged:
+        stop(NOT_TRUSTED, result.report.message)
+
+
+def write_json(path: Path, document: dict[str, Any]) -> None:
+    """Write JSON whole or not at all; what is not finite becomes null."""
+    write_bytes(path, (json.dumps(finite(document), indent=2) + "\n").encode())
+
+
+def finite(value: Any) -> Any:
+    """The value with null in place of NaN and infinities, which JSON does not know."""
+    if isinstance(value, dict):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+# -- register ------------------------------------------------------------------------------------
+
+
+@cli.command("register", short_help="Bring SOURCE images onto the REFERENCE pixels.")
+@rig_argument
+@frames_arguments
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Folder to write to: images under the reference's names, and masks/.",
+)
+@click.option("--overlay", "overlays", is_flag=True, help="Also write red-cyan overlays/.")
+@threads_option
+@quiet_option
+def register_command(
+    rig_file: Path, output: Path, overlays: bool, threads: int, quiet: bool, **inputs: Any
+) -> None:
+    """Bring every SOURCE image onto the pixels of its REFERENCE image.
+
+    Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
+    """
+    rig = Rig.load(rig_file)
+    frames = Frames.open(**inputs)
+    for name in ("reference", "source", "depth_spec"):
+        if Path(inputs[name]).resolve() == output.resolve():
+            raise InputError(f"output folder {output} is an input folder, expected another")
+    check_folder_writable(output)
+    total = run_registration(frames, rig, output, threads, overlays, quiet)
+    click.echo(f"{total.summary()}: {output}")
+    if not total.valid:
+        stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")
+
+
+# -- evaluate ------------------------------------------------------------------------------------
+
+
+@cli.command("evaluate", short_help="Score registered SOURCE images against REFERENCE.")
+@rig_argument
+@frames_arguments
+@click.option(
+    "--width",
+    metavar="PX",
+    type=click.IntRange(min=1),
+    default=640,
+    show_default=True,
+    help="Judge at the reference size divided by the least integer that makes it this wide [px].",
+)
+@click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Also write all scores, frame by frame (JSON).",
+)
+@threads_option
+@quiet_option
+def evaluate_command(
+    rig_file: Path, width: int, json_file: Path | None, threads: int, quiet: bool, **inputs: Any
+) -> None:
+    """Score the registered SOURCE against REFERENCE, beside the source that is only resized."""
+    rig = Rig.load(rig_file)
+    frames = Frames.open(**inputs)
+    if json_file:
+        check_file_writable(json_file)
+    # Depth wants the reference image too: tee hands it on, so that it is read once.
+    references, for_depth = itertools.tee(frames.references)
+    result = evaluate(
+        rig,
+        progress(references, len(frames), "evaluating", quiet),
+        frames.sources,
+        (frames.depth(index, image) for index, image in enumerate(for_depth)),
+        width,
+        threads,
+    )
+    click.echo(result.table())
+    if json_file:
+        names = [path.name for path in frames.references.paths]
+        write_json(json_file, {"rig": str(rig_file), "files": names} | result.to_dict())
+    if not result.valid_share:
+        stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")
+
+
+# -- demo ----------------------------------------------------------------------------------------
+
+
+@cli.command("demo", short_help="Render a rig in a street, calibrate and register it.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    type=click.Path(path_type=Path),
+    default=Path("xcalib-demo"),
+    show_default=True,
+    help="Folder to write to.",
+)
+@click.option(
+    "--frames",
+    "num_frames",
+    metavar="N",
+    type=click.IntRange(min=1),
+    default=8,
+    show_default=True,
+    help="Frames to render.",
+)
+@click.option(
+    "--seed",
+    metavar="N",
+    type=SEED,
+    default=DEFAULTS.seed,
+    show_default=True,
+    help="Seed of the scene, its noise and the frame choice.",
+)
+@click.option("--night", is_flag=True, help="A dark visible image.")
+@click.option(
+    "--width",
+    metavar="PX",
+    type=click.IntRange(min=64),
+    default=None,
+    show_default="as designed",
+    help="Render the reference camera at this width, the source in proportion [px].",
+)
+@quiet_option
+def demo_command(
+    output: Path, num_frames: int, seed: int, night: bool, width: int | None, quiet: bool
+) -> None:
+    """Render a rig in a street, calibrate it from the files, and compare with the truth."""
+    result = run_demo(output, num_frames, seed, night, width, quiet, click.echo)
+    if not result.converged:
+        stop(NOT_TRUSTED, result.report.message)
+
+
+# -- inspect -------------------------------------------------------------------------------------
+
+
+@cli.command("inspect")
+@rig_argument
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def inspect_command(rig_file: Path, as_json: bool) -> None:
+    """Print what a rig file says, in units one can picture."""
+    facts = describe(Rig.load(rig_file))
+    if as_json:
+        click.echo(json.dumps(finite(facts), indent=2))
+        return
+    for line in as_lines(facts):
+        click.echo(line)
+
+
+# -- report --------------------------------------------------------------------------------------
+
+
+@cli.command("report", short_help="Print the report file of a calibration.")
+@click.argument("report_file", metavar="FILE", type=click.Path(path_type=Path))
+def report_command(report_file: Path) -> None:
+    """Print the report that `xcalib calibrate --report FILE` wrote."""
+    try:
+        document = json.loads(report_file.read_text(encoding="utf-8"))
+    except ValueError:
+        raise InputError(f"{report_file}: not a JSON file") from None
+    kind = document.get("format") if isinstance(document, dict) else None
+    if kind != "xcalib-report" or document.get("version") != 1:
+        raise InputError(f"{report_file}: expected format xcalib-report, version 1")
+    click.echo("\n".join(lines_of(document)))
+
+
+def lines_of(document: dict[str, Any], indent: str = "") -> Iterator[str]:
+    """A JSON object as text: values by name, lists of objects as tables."""
+    for key, value in document.items():
+        if isinstance(value, dict):
+            yield f"{indent}{key}:"
+            yield from lines_of(value, indent + "  ")
+        elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+            yield f"{indent}{key}:"
+            names = list(value[0])
+            cells = [names, *([short(item.get(name)) for name in names] for item in value)]
+            widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+            for row in cells:
+                yield f"{indent}  " + "  ".join(map(str.rjust, row, widths))
+        else:
+            yield f"{indent}{key}: {short(value)}"
+
+
+def short(value: Any) -> str:
+    """A value in a few characters."""
+    if isinstance(value, list):
+        return ", ".join(map(short, value))
+    return f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
+
+
+def main() -> None:
+    """Entry point of the ``xcalib`` command."""
+    cli(prog_name="xcalib")
+
+
+if __name__ == "__main__":
+    main()

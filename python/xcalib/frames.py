@@ -1,0 +1,326 @@
+"""Frames on disk: folders of images in, whole image files out.
+
+A folder of images is a stream of frames. Files are taken in *natural* order of their names
+(``2.png`` before ``10.png``); hidden files and files of other types are ignored. Images are numpy
+arrays ``(H, W)`` or ``(H, W, 3)`` of ``uint8``, ``uint16`` or ``float32`` in the file's own range;
+colour is in OpenCV's order, blue-green-red, and an alpha channel is dropped.
+
+Nothing half-written: a file appears under its name only when it is complete.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Callable, Collection, Hashable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, overload
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ._core import Rig
+
+Image = NDArray[Any]
+Size = tuple[int, int]
+"""Width and height [px]."""
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+
+
+class InputError(ValueError):
+    """Input that cannot be used; the message names the file or argument and what was expected."""
+
+
+# -- Names ---------------------------------------------------------------------------------------
+
+
+def natural_key(name: str) -> tuple[Any, ...]:
+    """Sort key that compares runs of digits as numbers: ``a2`` before ``a10``."""
+    parts = re.split(r"([0-9]+)", name.casefold())  # text at even places, digits at odd ones
+    return (*(int(part) if i % 2 else part for i, part in enumerate(parts)), name)
+
+
+def list_files(folder: str | Path, suffixes: Collection[str] = IMAGE_SUFFIXES) -> list[Path]:
+    """Files of ``folder`` with one of ``suffixes`` (any case), in natural order, at least one."""
+    folder = Path(folder)
+    kinds = ", ".join(suffix.lstrip(".") for suffix in suffixes)
+    if not folder.exists():
+        raise InputError(f"{folder}: no such folder")
+    if not folder.is_dir():
+        raise InputError(f"{folder} is a file, expected a folder of {kinds} files")
+    paths = [
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in suffixes and not path.name.startswith(".") and path.is_file()
+    ]
+    if not paths:
+        raise InputError(f"{folder}: empty, expected {kinds} files in it")
+    return sorted(paths, key=lambda path: natural_key(path.name))
+
+
+def pair(first: Sequence[Path], second: Sequence[Path]) -> list[tuple[Path, Path]]:
+    """Pair the files of two folders, in the order of the first.
+
+    1. The counts must agree.
+    2. Files of the same stem belong together (``00007.png`` and ``00007.tiff``).
+    3. If no stem is common, files with the same numbers in their names do
+       (``FLIR_00007_Z`` and ``FLIR_00007_T``).
+    4. If no number is common either, natural order decides.
+
+    Names that agree only in part are an error: a frame is missing somewhere, and natural order
+    would pair every later one with a stranger.
+    """
+    folders = first[0].parent, second[0].parent
+    for key in (_stem, _numbers):
+        partners = [_by_key(paths, key) for paths in (first, second)]
+        common = partners[0].keys() & partners[1].keys()
+        if not common:
+            continue
+        lost = [path for own in partners for k, path in own.items() if k not in common]
+        if not lost:
+            return [(path, partners[1][key(path)]) for path in first]
+        raise InputError(
+            f"{folders[0]} ({len(first)} files) and {folders[1]} ({len(second)} files) do not"
+            f" pair: without a partner {_few(lost)};"
+            " expected the same names or numbers in both"
+        )
+    if len(first) != len(second):
+        raise InputError(
+            f"{folders[0]} has {len(first)} files, {folders[1]} has {len(second)};"
+            " expected as many in both, with the same names"
+        )
+    return list(zip(first, second, strict=True))
+
+
+def _stem(path: Path) -> Hashable:
+    return path.stem
+
+
+def _numbers(path: Path) -> Hashable:
+    return tuple(int(digits) for digits in re.findall(r"[0-9]+", path.stem))
+
+
+def _by_key(paths: Sequence[Path], key: Callable[[Path], Hashable]) -> dict[Hashable, Path]:
+    """Files by their key; empty where keys are missing or not unique, and so tell nothing."""
+    found = {key(path): path for path in paths}
+    if key is _stem and len(found) < len(paths):
+        twin = next(path for path in paths if found[path.stem] != path)
+        raise InputError(
+            f"{twin.parent} has both {twin.name} and {found[twin.stem].name};"
+            " expected one file per frame"
+        )
+    return found if len(found) == len(paths) and () not in found else {}
+
+
+def _few(paths: Sequence[Path], count: int = 3) -> str:
+    names = ", ".join(f"{path.parent.name}/{path.name}" for path in paths[:count])
+    return names + (f" and {len(paths) - count} more" if len(paths) > count else "")
+
+
+# -- Reading -------------------------------------------------------------------------------------
+
+
+def read_image(path: str | Path) -> Image:
+    """Read one image: ``(H, W)`` or ``(H, W, 3)``, uint8, uint16 or float32.
+
+    The pixels come as they are stored: no rotation by EXIF tags, for a camera's geometry is that
+    of its sensor.
+    """
+    image = decode(Path(path))
+    if image.ndim == 3:
+        # Two and four channels are gray and colour with alpha.
+        image = image[..., 0] if image.shape[2] < 3 else image[..., :3]
+    if image.dtype == np.float64:
+        image = image.astype(np.float32)
+    if image.dtype not in (np.uint8, np.uint16, np.float32):
+        raise InputError(f"{path}: pixels are {image.dtype}, expected uint8, uint16 or float32")
+    return np.ascontiguousarray(image)
+
+
+def decode(path: Path) -> Image:
+    """Decode an image file with all its channels, or raise `InputError` naming the file."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    data = path.read_bytes()
+    image = None
+    # OpenCV's own words on a bad file would come between our one line and its reader.
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        if data and not _is_truncated(data):
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        pass
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+    if image is None:
+        raise InputError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
+    return image
+
+
+def _is_truncated(data: bytes) -> bool:
+    """Whether a PNG or JPEG ends early: OpenCV would return it with a gray or black rest."""
+    if data.startswith(b"\x89PNG"):
+        return b"\x00\x00\x00\x00IEND\xaeB`\x82" not in data
+    if not data.startswith(b"\xff\xd8"):
+        return False
+    # Walk the segments to the scan: thumbnails inside them have end markers of their own. In the
+    # scan a byte FF is always escaped, so that FF D9 is the end and nothing else.
+    at = 2
+    while data[at : at + 1] == b"\xff" and data[at : at + 2] != b"\xff\xda":
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return b"\xff\xd9" not in data[at:]
+
+
+def size_of(image: Image) -> Size:
+    """Width and height [px] of an image or a depth map."""
+    return image.shape[1], image.shape[0]
+
+
+class Images(Sequence[Image]):
+    """The images of a list of files, read at the moment of access, all of one size."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.paths = list(paths)
+        self._first: tuple[Path, Size] | None = None
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    @overload
+    def __getitem__(self, index: int) -> Image: ...
+    @overload
+    def __getitem__(self, index: slice) -> Images: ...
+    def __getitem__(self, index: int | slice) -> Image | Images:
+        if isinstance(index, slice):
+            return Images(self.paths[index])
+        path = self.paths[index]
+        image = read_image(path)
+        size = size_of(image)
+        if self._first is None:
+            self._first = path, size
+        first, expected = self._first
+        if size != expected:
+            raise InputError(
+                f"{path} is {size[0]}x{size[1]}, expected {expected[0]}x{expected[1]}"
+                f" as {first.name}"
+            )
+        return image
+
+    def __iter__(self) -> Iterator[Image]:
+        return (self[index] for index in range(len(self)))
+
+
+def open_pairs(reference: str | Path, source: str | Path) -> tuple[Images, Images]:
+    """The two cameras' folders as two equally long sequences of images, paired by `pair`."""
+    pairs = pair(list_files(reference), list_files(source))
+    return Images([first for first, _ in pairs]), Images([second for _, second in pairs])
+
+
+# -- Sizes ---------------------------------------------------------------------------------------
+
+
+def same_aspect(size: Size, reference: Size) -> bool:
+    """Whether ``size`` is ``reference`` scaled, to within one pixel of rounding."""
+    return abs(size[0] * reference[1] - size[1] * reference[0]) <= max(reference)
+
+
+def fit_rig(rig: Rig, reference: Size, source: Size) -> Rig:
+    """The rig for images of these sizes: itself, or rescaled when both aspects are the same."""
+    for name, camera, size in (
+        ("reference", rig.reference, reference),
+        ("source", rig.source, source),
+    ):
+        if not same_aspect(size, (camera.width, camera.height)):
+            raise InputError(
+                f"{name} images are {size[0]}x{size[1]}, but the rig's {name} camera is"
+                f" {camera.width}x{camera.height}; expected that size or the same aspect"
+            )
+    sizes = (*reference, *source)
+    own = (rig.reference.width, rig.reference.height, rig.source.width, rig.source.height)
+    return rig if sizes == own else rig.resized(*sizes)
+
+
+# -- Gray and overlay ----------------------------------------------------------------------------
+
+
+def gray(image: Image) -> NDArray[np.float32]:
+    """Gray in [0, 1], ``(H, W)`` float32: integers over their range, floats as they are."""
+    if image.ndim == 3:
+        image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    if image.dtype == np.float32:
+        return image
+    return image.astype(np.float32) / np.float32(np.iinfo(image.dtype).max)
+
+
+def display_gray(image: Image) -> NDArray[np.uint8]:
+    """Gray for the eye: 1 to 99 % of the non-zero pixels stretched to 0 to 255."""
+    values = gray(image)
+    used = values[np.isfinite(values) & (values != 0)]
+    low, high = np.percentile(used, (1, 99)) if used.size else (0.0, 1.0)
+    scaled = (values - low) * (255 / max(high - low, 1e-6))
+    return np.nan_to_num(scaled).clip(0, 255).astype(np.uint8)
+
+
+def overlay(
+    reference: Image, registered: Image, valid: NDArray[np.bool_] | None = None
+) -> NDArray[np.uint8]:
+    """Red-cyan composite ``(H, W, 3)`` of two images of one size: reference red, other cyan.
+
+    Where the other is not valid the reference alone is shown, in gray.
+    """
+    red, cyan = display_gray(reference), display_gray(registered)
+    if valid is not None:
+        cyan = np.where(valid, cyan, red)
+    return np.dstack([cyan, cyan, red])
+
+
+# -- Writing -------------------------------------------------------------------------------------
+
+
+def check_folder_writable(folder: str | Path) -> None:
+    """Raise `InputError` now, before long work, if nothing can be written below ``folder``.
+
+    The folder need not exist, and is not made.
+    """
+    folder = Path(folder)
+    base = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    if not base.is_dir():
+        raise InputError(f"cannot write to {folder}: {base} is a file, expected a folder")
+    try:
+        # Only an attempt tells: access rights say nothing of read-only and special file systems.
+        with tempfile.TemporaryFile(dir=base):
+            pass
+    except OSError as error:
+        raise InputError(f"cannot write to {folder}: {base}: {error.strerror}") from None
+
+
+def check_file_writable(path: str | Path) -> None:
+    """Raise `InputError` now, before long work, if the file ``path`` cannot be written."""
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"cannot write {path}: it is a folder, expected a file name")
+    check_folder_writable(path.parent)
+
+
+def write_bytes(path: str | Path, data: bytes) -> None:
+    """Write a file whole or not at all, and make its folder."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        partial.write_bytes(data)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_image(path: str | Path, image: Image) -> None:
+    """Encode an image by the suffix of ``path`` and write it whole or not at all."""
+    path = Path(path)
+    done, data = cv2.imencode(path.suffix, image)
+    if not done:
+        raise ValueError(f"{path}: cannot encode {image.shape} {image.dtype}")
+    write_bytes(path, data.tobytes())

@@ -1,0 +1,166 @@
+"""From frames on disk to a rig, and to registered frames on disk.
+
+What the commands do, with progress bars on stderr; the commands themselves are in `cli`.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, calibrate, choose_frames
+from .depth import PNG_SCALE, DepthProvider, PlaneDepth, open_depth
+from .frames import Image, Images, InputError, fit_rig, open_pairs, overlay, size_of, write_image
+
+T = TypeVar("T")
+
+
+def progress(items: Iterable[T], total: int, what: str, quiet: bool = False) -> Iterator[T]:
+    """The items, with a bar on stderr if that is a terminal."""
+    bar: Iterable[T] = tqdm(
+        items, total=total, desc=what, unit="frame", disable=True if quiet else None, leave=False
+    )
+    return iter(bar)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Paired frames on disk, opened but not read."""
+
+    references: Images
+    sources: Images
+    depth: DepthProvider
+
+    @staticmethod
+    def open(
+        reference: Path,
+        source: Path,
+        depth_spec: str,
+        depth_scale: float = PNG_SCALE,
+        camera_height: float = PlaneDepth.camera_height,
+        horizon: float = PlaneDepth.horizon,
+        far: float = PlaneDepth.far,
+        plane_hfov: float = PlaneDepth.hfov_deg,
+    ) -> Frames:
+        """Open frames as the arguments of the commands name them."""
+        references, sources = open_pairs(reference, source)
+        plane = PlaneDepth(camera_height, horizon, far, plane_hfov)
+        return Frames(
+            references, sources, open_depth(depth_spec, references.paths, depth_scale, plane)
+        )
+
+    def __len__(self) -> int:
+        return len(self.references)
+
+    def read(self, index: int) -> tuple[Image, Image, NDArray[np.float32]]:
+        """Reference, source and depth of one frame."""
+        reference = self.references[index]
+        return reference, self.sources[index], self.depth(index, reference)
+
+    def fit(self, rig: Rig) -> Rig:
+        """The rig at the size of these frames, which the first one tells."""
+        return fit_rig(rig, size_of(self.references[0]), size_of(self.sources[0]))
+
+
+def run_calibration(
+    frames: Frames,
+    calibration: CalibrationOptions,
+    initial: Rig | None = None,
+    quiet: bool = False,
+    prepare: Callable[[CalibrationOptions, Image, Image], None] | None = None,
+) -> tuple[CalibrationResult, list[int]]:
+    """Load the chosen frames and calibrate; returns the indices of the frames as well.
+
+    ``prepare`` completes the options once the images, and so their sizes, are known.
+    """
+    chosen = choose_frames(len(frames), calibration.max_frames, calibration.seed)
+    loading = progress(chosen, len(chosen), "loading", quiet)
+    references, sources, depths = zip(*(frames.read(index) for index in loading), strict=True)
+    if prepare is not None:
+        prepare(calibration, references[0], sources[0])
+    if initial is not None:
+        initial = fit_rig(initial, size_of(references[0]), size_of(sources[0]))
+
+    with tqdm(
+        total=1.0,
+        bar_format="{desc} {percentage:3.0f}%|{bar}| {elapsed}",
+        disable=True if quiet else None,
+        leave=False,
+    ) as bar:
+
+        def show(stage: str, fraction: float) -> None:
+            bar.set_description_str(stage, refresh=False)
+            bar.update(fraction - bar.n)
+
+        try:
+            result = calibrate(references, sources, depths, initial, calibration, show)
+        except ValueError as error:
+            raise InputError(_with_file_name(str(error), frames.references, chosen)) from None
+    return result, chosen
+
+
+def _with_file_name(message: str, images: Images, chosen: Sequence[int]) -> str:
+    """The message with the file that the core, which sees arrays only, calls ``frame N``."""
+    found = re.search(r"\bframe (\d+)\b", message)
+    if not found or int(found[1]) >= len(chosen):
+        return message
+    return f"{message} (frame {found[1]} is {images.paths[chosen[int(found[1])]]})"
+
+
+def save_rig(rig: Rig, path: Path) -> None:
+    """Write a rig file, and make its folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rig.save(path)
+
+
+@dataclass
+class Registration:
+    """Totals over a stream of registered frames."""
+
+    frames: int = 0
+    valid: int = 0
+    pixels: int = 0
+    seconds: float = 0.0
+
+    def summary(self) -> str:
+        """One line."""
+        share = 100 * self.valid / self.pixels
+        speed = self.frames / max(self.seconds, 1e-9)
+        return f"{self.frames} frames, {share:.1f} % valid, {speed:.1f} frames/s with files"
+
+
+def run_registration(
+    frames: Frames,
+    rig: Rig,
+    folder: Path,
+    threads: int = 0,
+    overlays: bool = False,
+    quiet: bool = False,
+) -> Registration:
+    """Register frame by frame and write images, masks and, if asked for, overlays."""
+    registrar = Registrar(frames.fit(rig), threads)
+    total = Registration()
+    start = time.perf_counter()
+    for index in progress(range(len(frames)), len(frames), "registering", quiet):
+        reference, source, depth = frames.read(index)
+        image, mask = registrar.register(source, depth)
+        stem = frames.references.paths[index].stem
+        suffix = ".tiff" if image.dtype == np.float32 else ".png"
+        write_image(folder / f"{stem}{suffix}", image)
+        write_image(folder / "masks" / f"{stem}.png", mask)
+        if overlays:
+            picture = overlay(reference, image, mask == 0)
+            write_image(folder / "overlays" / f"{stem}.png", picture)
+        total.frames += 1
+        total.valid += int(np.count_nonzero(mask == 0))
+        total.pixels += mask.size
+    total.seconds = time.perf_counter() - start
+    return total

@@ -1,0 +1,162 @@
+// What the tests look at: rigs, and smooth scenes that are known everywhere, not only at pixels.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "xcalib/camera.hpp"
+#include "xcalib/image.hpp"
+#include "xcalib/warp.hpp"
+
+namespace xcalib::testing {
+
+// A value at every place of the reference image [px].
+using Field = std::function<double(double x, double y)>;
+
+inline double uniform(std::mt19937& random, double low, double high) {
+    return low + (high - low) * (random() / 4294967296.0);
+}
+
+// R <- exp(w) R, as in `Parameter`.
+inline Rig turned(const Rig& rig, const Eigen::Vector3d& w) {
+    Rig out = rig;
+    if (w.norm() > 0)
+        out.source_from_reference.rotation =
+            (Eigen::Quaterniond(Eigen::AngleAxisd(w.norm(), w.normalized())) *
+             rig.source_from_reference.rotation)
+                .normalized();
+    return out;
+}
+
+// Cameras that differ in everything, skew included; the source sees about what the reference sees.
+inline Rig random_rig(std::mt19937& random, int width, int height, int source_width,
+                      int source_height) {
+    const auto camera = [&](int w, int h) {
+        Pinhole c = Pinhole::from_hfov(w, h, uniform(random, 0.7, 1.0));
+        c.fy *= uniform(random, 0.97, 1.03);
+        c.cx += uniform(random, -0.02, 0.02) * w;
+        c.cy += uniform(random, -0.02, 0.02) * h;
+        c.skew = uniform(random, -0.02, 0.02) * w;
+        return c;
+    };
+    Rig rig;
+    rig.reference = camera(width, height);
+    rig.source = camera(source_width, source_height);
+    rig.source_from_reference.translation = {uniform(random, -0.3, 0.3), uniform(random, -0.1, 0.1),
+                                             uniform(random, -0.1, 0.1)};
+    return turned(rig, {uniform(random, -0.05, 0.05), uniform(random, -0.05, 0.05),
+                        uniform(random, -0.05, 0.05)});
+}
+
+// Eq. (3d_mapping) step by step, in double: unproject, move, project.
+inline Eigen::Vector2d mapped(const Rig& rig, double x, double y, double depth) {
+    return project(rig.source, rig.R() * unproject(rig.reference, x, y, depth) + rig.t());
+}
+
+// Round Gaussian blobs of both signs over a width x height image. The middle `share` of either side
+// holds their centres, so that edges vanish towards the border.
+inline Field blobs(std::mt19937& random, int width, int height, int count, double sigma,
+                   double share) {
+    struct Blob {
+        double x, y, height, sigma;
+    };
+    std::vector<Blob> all;
+    for (int i = 0; i < count; ++i)
+        all.push_back({width * (0.5 + share * uniform(random, -0.5, 0.5)),
+                       height * (0.5 + share * uniform(random, -0.5, 0.5)),
+                       (i % 2 ? -1 : 1) * uniform(random, 0.1, 0.4),
+                       sigma * uniform(random, 0.8, 1.3)});
+    return [all](double x, double y) {
+        double value = 0.5;
+        for (const Blob& b : all)
+            value += b.height * std::exp(-0.5 * (std::pow(x - b.x, 2) + std::pow(y - b.y, 2)) /
+                                         (b.sigma * b.sigma));
+        return value;
+    };
+}
+
+// Smooth depth between about 3 and 12 m: what is near moves against what is far.
+inline Field rolling_depth(int width, int height) {
+    return [=](double x, double y) {
+        const double u = x / width - 0.5, v = y / height - 0.5;
+        return 1.0 / (0.2 + 0.12 * v + 0.05 * u + 0.06 * std::sin(5 * u) * std::cos(4 * v));
+    };
+}
+
+inline Image drawn(const Field& field, int width, int height) {
+    Image image(width, height);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) image.row(y)[x] = static_cast<float>(field(x, y));
+    return image;
+}
+
+// What the source camera sees of a scene that `texture` and `depth` give on the reference's image:
+// each source pixel's place on the reference is found by Newton's method on Eq. (3d_mapping).
+inline Image source_view(const Rig& rig, const Field& texture, const Field& depth) {
+    Image image(rig.source.width, rig.source.height);
+    const Eigen::Matrix3d back = infinite_homography(rig).inverse();
+    const auto target = [&](const Eigen::Vector2d& x) {
+        return mapped(rig, x.x(), x.y(), depth(x.x(), x.y()));
+    };
+    for (int v = 0; v < image.height; ++v)
+        for (int u = 0; u < image.width; ++u) {
+            const Eigen::Vector2d wanted(u, v);
+            Eigen::Vector2d x = (back * wanted.homogeneous()).hnormalized();
+            for (int i = 0; i < 8; ++i) {
+                constexpr double kStep = 1e-3;
+                const Eigen::Vector2d at = target(x);
+                Eigen::Matrix2d slope;
+                slope.col(0) = (target(x + Eigen::Vector2d(kStep, 0)) - at) / kStep;
+                slope.col(1) = (target(x + Eigen::Vector2d(0, kStep)) - at) / kStep;
+                x += slope.inverse() * (wanted - at);
+            }
+            image.row(v)[u] = static_cast<float>(texture(x.x(), x.y()));
+        }
+    return image;
+}
+
+// A rig moved by `step` along one parameter, in the solver's scaling.
+inline Rig moved(const Rig& rig, int parameter, double step) {
+    if (parameter >= kRotationX && parameter <= kRotationZ) {
+        Eigen::Vector3d w = Eigen::Vector3d::Zero();
+        w[parameter - kRotationX] = step;
+        return turned(rig, w);
+    }
+    SolverParameters p = solver_from_rig(rig);
+    const auto in_camera = [step](SolverParameters::Camera& camera, int which) {
+        double* const fields[] = {&camera.log_f[0], &camera.log_f[1], &camera.center[0],
+                                  &camera.center[1], &camera.skew[0]};
+        *fields[which] += step;
+    };
+    if (parameter >= kReferenceLogFx)
+        in_camera(p.reference, parameter - kReferenceLogFx);
+    else if (parameter >= kTranslationX)
+        p.translation[parameter - kTranslationX] += step;
+    else
+        in_camera(p.source, parameter - kSourceLogFx);
+    return rig_from_solver(p, rig.reference.width, rig.reference.height, rig.source.width,
+                           rig.source.height);
+}
+
+// The classes of parameters that derivatives are judged by.
+struct ParameterClass {
+    const char* name;
+    int first, count;
+};
+inline constexpr ParameterClass kParameterClasses[] = {
+    {"source focal lengths", kSourceLogFx, 2},
+    {"source principal point", kSourceCx, 2},
+    {"source skew", kSourceSkew, 1},
+    {"rotation", kRotationX, 3},
+    {"translation", kTranslationX, 3},
+    {"reference focal lengths", kReferenceLogFx, 2},
+    {"reference principal point", kReferenceCx, 2},
+    {"reference skew", kReferenceSkew, 1},
+};
+
+}  // namespace xcalib::testing

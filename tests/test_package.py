@@ -1,0 +1,55 @@
+"""What is installed: the package as built, no more and no less, and not the source tree."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import sysconfig
+import tomllib
+from importlib.metadata import files, metadata
+from pathlib import Path, PurePosixPath
+
+import xcalib
+
+DISTRIBUTION = "xcalib-rgbt"
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_the_tests_import_the_installed_package() -> None:
+    assert Path(xcalib.__file__).is_relative_to(sysconfig.get_path("platlib"))
+
+
+def test_the_version_stands_in_pyproject_alone() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert xcalib.__version__ == metadata(DISTRIBUTION)["Version"] == project["version"]
+
+
+def test_the_wheel_holds_the_package_and_nothing_else() -> None:
+    installed = {PurePosixPath(path) for path in files(DISTRIBUTION) or []}
+    inside = {path.name for path in installed if path.parts[0] == "xcalib"}
+    sources = {path.name for path in (ROOT / "python" / "xcalib").iterdir() if path.is_file()}
+    module = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
+    assert {path for path in inside if not path.endswith(".pyc")} == sources | {module}
+    assert {"py.typed", "_core.pyi"} <= inside
+    info = next(path.parts[0] for path in installed if path.name == "METADATA")
+    tops = {path.parts[0] for path in installed}
+    assert tops == {"xcalib", info, ".."}  # .. leads to the environment's bin/xcalib
+    licences = {path.name for path in installed if "licenses" in path.parts}
+    assert licences == {"LICENSE", "README.md"}
+
+
+def test_two_opencvs_live_in_one_process() -> None:
+    """The core links the system's OpenCV, the package imports another one from PyPI."""
+    code = """
+import cv2, numpy as np, xcalib
+image = cv2.GaussianBlur(np.random.default_rng(0).random((48, 64), np.float32), (5, 5), 1)
+assert xcalib.metrics.nec(image, image) > 0.999
+rig = xcalib.Rig(*[xcalib.Pinhole(64, 48, 60, 60, 31.5, 23.5)] * 2)
+out, mask = xcalib.Registrar(rig).register(image, np.full((48, 64), 5, np.float32))
+assert abs(cv2.resize(out, (32, 24)) - cv2.resize(image, (32, 24))).max() < 1e-3
+"""
+    for order in (
+        code,
+        code.replace("import cv2, numpy as np, xcalib", "import xcalib, numpy as np, cv2"),
+    ):
+        subprocess.run([sys.executable, "-c", order], check=True, timeout=120)
