@@ -40,21 +40,23 @@ test-packages: | build-packages
 
 # -- The environment, and the package in it -------------------------------------------------------
 
-# $(call requirements,key,key): a list of requirements in pyproject.toml.
-comma := ,
-requirements = $(BIN)/python -c 'import sys, tomllib, functools; print(*functools.reduce(dict.get, \
-    sys.argv[1:], tomllib.load(open("pyproject.toml", "rb"))), sep="\n")' $(subst $(comma), ,$(1))
+# $(call requirements,table key): a list of requirements in pyproject.toml, one a line.
+requirements = $(BIN)/python -c 'import functools, sys, tomllib; \
+    table = tomllib.load(open("pyproject.toml", "rb")); \
+    print(*functools.reduce(dict.get, sys.argv[1:], table), sep="\n")' $(1)
 
 $(VENV)/.created: | build-packages
 	$(PYTHON) -m venv --clear $(VENV)
 	touch $@
 
 $(VENV)/.build-requires: pyproject.toml $(VENV)/.created
-	$(PIP) install -q -r <($(call requirements,build-system requires))
+	@echo "installing what the build requires"
+	@$(PIP) install -q -r <($(call requirements,build-system requires))
 	touch $@
 
 $(VENV)/.test-requires: pyproject.toml $(VENV)/.build-requires
-	$(PIP) install -q -r <($(call requirements,project optional-dependencies test))
+	@echo "installing what the tests require"
+	@$(PIP) install -q -r <($(call requirements,project optional-dependencies test))
 	touch $@
 
 # Without build isolation, so that CMake finds the same pybind11 again and builds what changed only.
@@ -86,6 +88,7 @@ test-sdist: build/sdist/.tested ## an sdist builds, and installs from source
 build/sdist/.tested: $(WHEEL_FILES) $(VENV)/.test-requires | $(VENV)/.installed
 	rm -rf build/sdist
 	$(BIN)/python -m build --sdist --no-isolation --outdir build/sdist .
+	! tar -tf build/sdist/*.tar.gz | grep -E '/(\.venv|build|__pycache__|\.[a-z]+_cache)/'
 	$(PIP) install -q --no-build-isolation --no-deps --target build/sdist/site build/sdist/*.tar.gz
 	cd build/sdist/site && ../../../$(BIN)/python -c \
 	    'import pathlib, xcalib; assert pathlib.Path(xcalib.__file__).is_relative_to(pathlib.Path.cwd())'

@@ -104,10 +104,6 @@ def test_the_stub_agrees_with_the_module() -> None:
 
 
 def test_every_bound_name_has_a_docstring() -> None:
-    # An option struct's fields say what its keyword arguments are.
-    silent = [
-        name
-        for name, said in bound(_core)
-        if not said.doc and said.parameters != ("**kwargs",) and not name.startswith("_")
-    ]
+    # A constructor may leave it to its class to say what it takes.
+    silent = [name for name, said in bound(_core) if not said.doc and not name.endswith("__init__")]
     assert silent == []

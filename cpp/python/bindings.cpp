@@ -43,8 +43,9 @@ Held image_of(const std::string& name, const py::object& object) {
     if (py::isinstance<py::array_t<std::uint8_t>>(given)) type = PixelType::u8;
     else if (py::isinstance<py::array_t<std::uint16_t>>(given)) type = PixelType::u16;
     else if (py::isinstance<py::array_t<float>>(given)) type = PixelType::f32;
-    else throw py::value_error(name + " has " + shape_text(given) +
-                               ", expected dtype uint8, uint16 or float32");
+    else
+        throw py::value_error(name + " has " + shape_text(given) +
+                              ", expected dtype uint8, uint16 or float32");
     const bool gray = given.ndim() == 2 || (given.ndim() == 3 && given.shape(2) == 1);
     if (!gray && !(given.ndim() == 3 && given.shape(2) == 3))
         throw py::value_error(name + " has " + shape_text(given) +
@@ -52,10 +53,13 @@ Held image_of(const std::string& name, const py::object& object) {
     if (given.size() == 0) throw py::value_error(name + " has " + shape_text(given) + ", is empty");
     Held held;
     held.array = py::array::ensure(given, py::array::c_style);
-    held.view = {held.array.data(), static_cast<int>(held.array.shape(1)),
-                 static_cast<int>(held.array.shape(0)), gray ? 1 : 3, type,
-                 static_cast<std::ptrdiff_t>(held.array.shape(1) * (gray ? 1 : 3) *
-                                             held.array.itemsize())};
+    held.view = {
+        held.array.data(),
+        static_cast<int>(held.array.shape(1)),
+        static_cast<int>(held.array.shape(0)),
+        gray ? 1 : 3,
+        type,
+        static_cast<std::ptrdiff_t>(held.array.shape(1) * (gray ? 1 : 3) * held.array.itemsize())};
     return held;
 }
 
@@ -86,12 +90,14 @@ HeldList list_of(const char* name, const py::sequence& sequence, const Convert& 
     return list;
 }
 
-Image gray_of(const char* name, const py::object& object) { return to_gray(image_of(name, object).view); }
+Image gray_of(const char* name, const py::object& object) {
+    return to_gray(image_of(name, object).view);
+}
 
 // Two images of one size as gray, and the mask over them.
 struct Compared {
     Image reference, registered;
-    py::array_t<std::uint8_t> mask;
+    py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast> mask;
     const std::uint8_t* valid = nullptr;
 };
 
@@ -113,8 +119,7 @@ Compared compared(const py::object& reference, const py::object& registered,
             given.shape(1) != out.reference.width)
             throw py::value_error("mask has " + (given ? shape_text(given) : "no shape") +
                                   ", expected the images' " + size(out.reference));
-        out.mask = py::module_::import("numpy").attr("not_equal")(given, 0)
-                       .attr("astype")("uint8");
+        out.mask = py::module_::import("numpy").attr("not_equal")(given, 0);
         out.valid = out.mask.data();
     }
     return out;
@@ -125,8 +130,19 @@ double range_of(const py::object& object, const py::object& data_range) {
     (void)object;
     if (data_range.is_none()) return 1.0;
     const double value = data_range.cast<double>();
-    if (!(value > 0)) throw py::value_error("data_range is " + std::to_string(value) + ", expected > 0");
+    if (!(value > 0))
+        throw py::value_error("data_range is " + std::to_string(value) + ", expected > 0");
     return value;
+}
+
+template <class Matrix>
+Matrix numbers_of(const char* name, const py::object& object, const char* expected) {
+    try {
+        return object.cast<Matrix>();
+    } catch (const py::cast_error&) {
+        throw py::value_error(std::string(name) + " is " + std::string(py::repr(object)) +
+                              ", expected " + expected);
+    }
 }
 
 Rig make_rig(const Pinhole& reference, const Pinhole& source, const py::object& R,
@@ -135,13 +151,15 @@ Rig make_rig(const Pinhole& reference, const Pinhole& source, const py::object& 
     rig.reference = reference;
     rig.source = source;
     if (!R.is_none()) {
-        const auto matrix = R.cast<Eigen::Matrix3d>();
+        const auto matrix = numbers_of<Eigen::Matrix3d>("R", R, "a (3, 3) array of numbers");
         if (!((matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6 &&
               matrix.determinant() > 0))
             throw py::value_error("R is not a rotation matrix (R R^T = I, det R = 1 within 1e-6)");
         rig.source_from_reference.rotation = Eigen::Quaterniond(matrix).normalized();
     }
-    if (!t.is_none()) rig.source_from_reference.translation = t.cast<Eigen::Vector3d>();
+    if (!t.is_none())
+        rig.source_from_reference.translation =
+            numbers_of<Eigen::Vector3d>("t", t, "a (3,) array of numbers");
     rig.validate();
     return rig;
 }
@@ -185,11 +203,11 @@ Options options_from(const py::kwargs& fields) {
 py::dict dict_of(const CalibrationReport& report) {
     py::list candidates, levels;
     for (const CandidateReport& c : report.candidates)
-        candidates.append(py::dict(
-            py::arg("score") = c.score, py::arg("correlation") = c.correlation, py::arg("overlap") = c.overlap,
-            py::arg("refined_nec") = c.refined_nec,
-            py::arg("reference_hfov_deg") = c.refined.reference.hfov() / kDegree,
-            py::arg("source_hfov_deg") = c.refined.source.hfov() / kDegree));
+        candidates.append(
+            py::dict(py::arg("score") = c.score, py::arg("correlation") = c.correlation,
+                     py::arg("overlap") = c.overlap, py::arg("refined_nec") = c.refined_nec,
+                     py::arg("reference_hfov_deg") = c.refined.reference.hfov() / kDegree,
+                     py::arg("source_hfov_deg") = c.refined.source.hfov() / kDegree));
     for (const LevelReport& l : report.levels)
         levels.append(py::dict(
             py::arg("factor") = l.factor, py::arg("stage") = l.stage, py::arg("width") = l.width,
@@ -203,7 +221,8 @@ py::dict dict_of(const CalibrationReport& report) {
         py::arg("seconds") = report.seconds, py::arg("search_seconds") = report.search_seconds,
         py::arg("working_width") = report.working_width,
         py::arg("working_height") = report.working_height, py::arg("nec") = report.nec,
-        py::arg("baseline_nec") = report.baseline_nec,
+        py::arg("baseline_nec") = report.baseline_nec, py::arg("contrast") = report.contrast,
+        py::arg("repeatability_px") = report.repeatability_px,
         py::arg("valid_share") = report.valid_share, py::arg("frames") = report.frames,
         py::arg("candidates") = candidates, py::arg("levels") = levels);
 }
@@ -236,7 +255,8 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
              }),
              py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
              py::arg("cy"), py::arg("skew") = 0.0,
-             "Raises ValueError where a size is below 1, a focal length not > 0, or a value not finite.")
+             "Raises ValueError where a size is below 1, a focal length not > 0, or a value not "
+             "finite.")
         .def_static(
             "from_hfov",
             [](int width, int height, double hfov_deg) {
@@ -267,7 +287,8 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
 `R` and `t` take points of the reference camera to the source camera: X_S = R X_R + t.)")
         .def(py::init(&make_rig), py::arg("reference"), py::arg("source"),
              py::arg("R") = py::none(), py::arg("t") = py::none(),
-             "R: (3, 3) rotation, default identity. t: (3,) [m], default zero. ValueError otherwise.")
+             "R: (3, 3) rotation, default identity. t: (3,) [m], default zero. ValueError "
+             "otherwise.")
         .def_readwrite("reference", &Rig::reference, "Pinhole that gives the pixel grid.")
         .def_readwrite("source", &Rig::source, "Pinhole whose images are registered.")
         .def_property(
@@ -294,12 +315,15 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def("resized", &Rig::resized, py::arg("reference_width"), py::arg("reference_height"),
              py::arg("source_width"), py::arg("source_height"),
              "The same rig behind images of other sizes [px].")
-        .def("save", [](const Rig& rig, const std::filesystem::path& path) { save_rig(rig, path.string()); },
-             py::arg("path"), "Writes the rig file, whole or not at all. OSError names the path.")
+        .def(
+            "save",
+            [](const Rig& rig, const std::filesystem::path& path) { save_rig(rig, path.string()); },
+            py::arg("path"), "Writes the rig file, whole or not at all. OSError names the path.")
         .def_static(
             "load", [](const std::filesystem::path& path) { return load_rig(path.string()); },
             py::arg("path"),
-            "Reads a rig file. OSError where it cannot be read; ValueError, with the path, the field "
+            "Reads a rig file. OSError where it cannot be read; ValueError, with the path, the "
+            "field "
             "and what was expected, where it is not a rig.")
         .def("__repr__", [](const Rig& rig) {
             std::ostringstream out;
@@ -354,7 +378,8 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readonly("width", &LevelReport::width, "[px]")
         .def_readonly("height", &LevelReport::height, "[px]")
         .def_readonly("iterations", &LevelReport::iterations, "Of Levenberg-Marquardt.")
-        .def_readonly("initial_cost", &LevelReport::initial_cost, "Eq. (image_loss), and the prior in stage 1.")
+        .def_readonly("initial_cost", &LevelReport::initial_cost,
+                      "Eq. (image_loss), and the prior in stage 1.")
         .def_readonly("final_cost", &LevelReport::final_cost, "The same at the end.")
         .def_readonly("nec", &LevelReport::nec, "Mean over the pairs, weighted by c_i.")
         .def_readonly("valid_share", &LevelReport::valid_share,
@@ -364,7 +389,8 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readonly("seconds", &LevelReport::seconds, "[s]")
         .def_readonly("stopped", &LevelReport::stopped, "Why it stopped.");
 
-    py::class_<CandidateReport>(m, "CandidateReport", "A peak of the search, and what became of it.")
+    py::class_<CandidateReport>(m, "CandidateReport",
+                                "A peak of the search, and what became of it.")
         .def_readonly("score", &CandidateReport::score, "Contrast against the typical value.")
         .def_readonly("correlation", &CandidateReport::correlation,
                       "Pooled over the frames, of doubled angles, in [-1, 1].")
@@ -383,9 +409,15 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readonly("nec", &CalibrationReport::nec, "At the finest level.")
         .def_readonly("baseline_nec", &CalibrationReport::baseline_nec,
                       "Typical of rigs displaced by many pixels.")
-        .def_readonly("valid_share", &CalibrationReport::valid_share, "Of the reference's edge energy.")
+        .def_readonly("contrast", &CalibrationReport::contrast,
+                      "Of the NEC above the baseline, in deviations over displacements.")
+        .def_readonly("repeatability_px", &CalibrationReport::repeatability_px,
+                      "Median distance between fits to two halves of the frames [working px].")
+        .def_readonly("valid_share", &CalibrationReport::valid_share,
+                      "Of the reference's edge energy.")
         .def_readonly("frames", &CalibrationReport::frames, "Indices of the pairs used.")
-        .def_readonly("candidates", &CalibrationReport::candidates, "Of the search, best score first.")
+        .def_readonly("candidates", &CalibrationReport::candidates,
+                      "Of the search, best score first.")
         .def_readonly("levels", &CalibrationReport::levels, "In the order solved.")
         .def("brief", &CalibrationReport::brief, "One line.")
         .def("full", &CalibrationReport::full, "A table.")
@@ -448,7 +480,8 @@ num_threads: 0 uses every core. Raises ValueError where the rig is not valid.)")
                 return out;
             },
             py::arg("depth"),
-            "(H, W, 2) float32: x and y in the source image [px] of each reference pixel, NaN where "
+            "(H, W, 2) float32: x and y in the source image [px] of each reference pixel, NaN "
+            "where "
             "it has none. depth: (h, w) float32 [m] of the reference's aspect.")
         .def(
             "register",
@@ -461,9 +494,12 @@ num_threads: 0 uses every core. Raises ValueError where the rig is not valid.)")
                 py::array image(s.array.dtype(), shape);
                 py::array_t<std::uint8_t> mask({grid.height, grid.width});
                 const MutableImageView out{
-                    image.mutable_data(), grid.width, grid.height, s.view.channels, s.view.type,
-                    static_cast<std::ptrdiff_t>(grid.width * s.view.channels *
-                                                image.itemsize())};
+                    image.mutable_data(),
+                    grid.width,
+                    grid.height,
+                    s.view.channels,
+                    s.view.type,
+                    static_cast<std::ptrdiff_t>(grid.width * s.view.channels * image.itemsize())};
                 std::uint8_t* codes = mask.mutable_data();
                 {
                     const py::gil_scoped_release unlocked;
@@ -506,11 +542,14 @@ only, as the authors' code) or "printed" (Eq. (gradient_clamping) as printed).)"
             },
             py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(), doc);
     };
-    metric("gc", &gc, "Gradient correlation: mean over x and y of the zero-mean normalized correlation "
-                      "of the absolute forward differences, in [-1, 1]. Images and mask as in nec().");
-    metric("ncc", &ncc, "Zero-mean normalized cross correlation, in [-1, 1]. Images and mask as in nec().");
-    metric("rmse", &rmse, "Root mean square error of gray values; integers scaled to [0, 1]. Images "
-                          "and mask as in nec().");
+    metric("gc", &gc,
+           "Gradient correlation: mean over x and y of the zero-mean normalized correlation "
+           "of the absolute forward differences, in [-1, 1]. Images and mask as in nec().");
+    metric("ncc", &ncc,
+           "Zero-mean normalized cross correlation, in [-1, 1]. Images and mask as in nec().");
+    metric("rmse", &rmse,
+           "Root mean square error of gray values; integers scaled to [0, 1]. Images "
+           "and mask as in nec().");
     const auto ranged = [&m](const char* name, auto function, const char* doc) {
         m.def(
             name,
@@ -524,11 +563,13 @@ only, as the authors' code) or "printed" (Eq. (gradient_clamping) as printed).)"
             py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(),
             py::arg("data_range") = py::none(), doc);
     };
-    ranged("ssim", &ssim, "Structural similarity (Wang et al. 2004), Gaussian window of sigma 1.5 px, "
-                          "over pixels whose 11 x 11 window is valid. data_range: span of the gray "
-                          "values, 1 by default. Images and mask as in nec().");
-    ranged("psnr", &psnr, "Peak signal-to-noise ratio [dB], 20 log10(data_range / RMSE). Images, mask "
-                          "and data_range as in ssim().");
+    ranged("ssim", &ssim,
+           "Structural similarity (Wang et al. 2004), Gaussian window of sigma 1.5 px, "
+           "over pixels whose 11 x 11 window is valid. data_range: span of the gray "
+           "values, 1 by default. Images and mask as in nec().");
+    ranged("psnr", &psnr,
+           "Peak signal-to-noise ratio [dB], 20 log10(data_range / RMSE). Images, mask "
+           "and data_range as in ssim().");
 
     m.def(
         "patch_shifts",

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <sstream>
 #include <stdexcept>
 
 #include "solve.hpp"
 #include "start.hpp"
+#include "verdict.hpp"
 #include "working_images.hpp"
 
 namespace xcalib {
@@ -14,11 +16,17 @@ namespace {
 
 void require(bool ok, const char* field, double value, const char* expected) {
     if (ok) return;
-    std::string text = std::to_string(value);
-    text.erase(text.find_last_not_of('0') + 1);
-    if (text.back() == '.') text.pop_back();
-    throw std::invalid_argument(std::string("options: ") + field + " = " + text + ", expected " +
-                                expected);
+    std::ostringstream message;
+    message << "options: " << field << " = " << value << ", expected " << expected;
+    throw std::invalid_argument(message.str());
+}
+
+void require_size(const char* name, const std::optional<Pinhole>& camera, const ImageView& image) {
+    if (!camera || (camera->width == image.width && camera->height == image.height)) return;
+    std::ostringstream message;
+    message << name << " is " << camera->width << "x" << camera->height << ", expected the images' "
+            << image.width << "x" << image.height;
+    throw std::invalid_argument(message.str());
 }
 
 }  // namespace
@@ -68,25 +76,32 @@ std::vector<int> choose_frames(int count, int max_frames, std::uint32_t seed) {
 
 CalibrationResult calibrate(const std::vector<ImageView>& references,
                             const std::vector<ImageView>& sources,
-                            const std::vector<ImageView>& depths,
-                            const std::optional<Rig>& initial, const CalibrationOptions& options,
-                            const Progress& progress) {
+                            const std::vector<ImageView>& depths, const std::optional<Rig>& initial,
+                            const CalibrationOptions& options, const Progress& progress) {
     const double start = seconds_now();
     const auto tell = [&](const char* stage, double share) {
         if (progress) progress(stage, share);
     };
     options.validate();
     validate_frames(references, sources, depths);
-    if (initial) initial->validate();
+    require_size("options: reference_camera", options.reference_camera, references[0]);
+    require_size("options: source_camera", options.source_camera, sources[0]);
+    if (initial) {
+        initial->validate();
+        require_size("initial rig: reference", initial->reference, references[0]);
+        require_size("initial rig: source", initial->source, sources[0]);
+    } else if (options.search.mode == SearchMode::local) {
+        throw std::invalid_argument(
+            "options: search.mode = local, expected an initial rig with it");
+    }
 
     CalibrationResult result;
     CalibrationReport& report = result.report;
     report.frames =
         choose_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
     tell("prepare", 0.0);
-    const WorkingImages images =
-        make_working_images(references, sources, depths, report.frames, options.working_width,
-                            options.num_threads);
+    const WorkingImages images = make_working_images(references, sources, depths, report.frames,
+                                                     options.working_width, options.num_threads);
     report.working_width = images.references[0].width;
     report.working_height = images.references[0].height;
 
@@ -108,11 +123,13 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
             share_limit = 0.8 * pooled(level, result.rig, options.num_threads).valid_share;
         report.levels.push_back(
             solve_level(level, steps[s].stage, share_limit, options, result.rig));
-        tell("refine", 0.6 + 0.4 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
+        tell("refine", 0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
     }
     report.nec = report.levels.back().nec;
     report.valid_share = report.levels.back().valid_share;
-    report.converged = result.converged = true;
+    judge(images, result.rig, options, report);
+    result.converged = report.converged;
+    tell("judge", 1.0);
     report.seconds = seconds_now() - start;
     return result;
 }

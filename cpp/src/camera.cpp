@@ -36,8 +36,8 @@ Pinhole pinhole_from_paper(const PaperParameters::Camera& p, int width, int heig
 PaperParameters::Camera paper_from_pinhole(const Pinhole& camera) {
     PaperParameters::Camera p;
     p.fx = std::atan(camera.width / (2 * camera.fx)) / (kPi / 8);
-    p.fy = std::atan(camera.height / (2 * camera.fy)) /
-           paper_half_vfov(camera.width, camera.height);
+    p.fy =
+        std::atan(camera.height / (2 * camera.fy)) / paper_half_vfov(camera.width, camera.height);
     p.cx = (camera.cx + 0.5) / camera.width;
     p.cy = (camera.cy + 0.5) / camera.height;
     p.skew = camera.skew;

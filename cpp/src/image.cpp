@@ -55,19 +55,21 @@ float reduced_depth(const Image& depth, double x0, double x1, double y0, double 
     const int right = std::max(left + 1, static_cast<int>(std::floor(x1 + 0.5)));
     const int top = static_cast<int>(std::floor(y0 + 0.5));
     const int bottom = std::max(top + 1, static_cast<int>(std::floor(y1 + 0.5)));
-    float values[256];
-    int count = 0, cells = 0;
+    std::vector<float> values;
+    int cells = 0;
     for (int y = top; y < std::min(bottom, depth.height); ++y)
         for (int x = left; x < std::min(right, depth.width); ++x, ++cells)
-            if (const float d = depth.row(y)[x]; d > 0 && count < 256) values[count++] = d;
-    if (2 * count < cells || count == 0) return 0.0f;
-    std::nth_element(values, values + count / 2, values + count);
-    const float median = values[count / 2];
+            if (const float d = depth.row(y)[x]; d > 0) values.push_back(d);
+    const std::size_t count = values.size();
+    if (count == 0 || 2 * count < static_cast<std::size_t>(cells)) return 0.0f;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    const float median = *middle;
     double inverse = 0;
     int members = 0;
-    for (int i = 0; i < count; ++i)
-        if (values[i] < median * kSameSurface && values[i] * kSameSurface > median) {
-            inverse += 1.0 / values[i];
+    for (const float value : values)
+        if (value < median * kSameSurface && value * kSameSurface > median) {
+            inverse += 1.0 / value;
             ++members;
         }
     return static_cast<float>(members / inverse);
@@ -86,8 +88,8 @@ float interpolated_depth(const Image& depth, double x, double y) {
         if (value <= 0 || value > nearest * kSameSurface || value * kSameSurface < nearest)
             return nearest;
     const double ax = std::clamp(x - x0, 0.0, 1.0), ay = std::clamp(y - y0, 0.0, 1.0);
-    const double inverse = (1 - ay) * ((1 - ax) / d[0] + ax / d[1]) +
-                           ay * ((1 - ax) / d[2] + ax / d[3]);
+    const double inverse =
+        (1 - ay) * ((1 - ax) / d[0] + ax / d[1]) + ay * ((1 - ax) / d[2] + ax / d[3]);
     return static_cast<float>(1.0 / inverse);
 }
 
@@ -115,8 +117,8 @@ Image to_gray(const ImageView& image) {
             for (std::size_t i = 0; i < gray.pixels.size(); ++i)
                 if (!std::isfinite(gray.pixels[i])) {
                     std::ostringstream message;
-                    message << "image has the value " << gray.pixels[i] << " at x = "
-                            << i % image.width << ", y = " << i / image.width
+                    message << "image has the value " << gray.pixels[i]
+                            << " at x = " << i % image.width << ", y = " << i / image.width
                             << ", expected finite pixels";
                     throw std::invalid_argument(message.str());
                 }
@@ -139,8 +141,7 @@ Image gaussian_blur(const Image& image, double sigma_px) {
     if (sigma_px <= 0) return image;
     Image out(image.width, image.height);
     cv::Mat result = as_mat(out);
-    cv::GaussianBlur(as_mat(image), result, cv::Size(), sigma_px, sigma_px,
-                     cv::BORDER_REPLICATE);
+    cv::GaussianBlur(as_mat(image), result, cv::Size(), sigma_px, sigma_px, cv::BORDER_REPLICATE);
     return out;
 }
 
@@ -209,7 +210,9 @@ void require_same_aspect(const char* name, int width, int height, int expected_w
                          int expected_height) {
     const long difference = std::labs(static_cast<long>(width) * expected_height -
                                       static_cast<long>(height) * expected_width);
-    if (width > 0 && height > 0 && difference <= std::max(expected_width, expected_height)) return;
+    if (width > 0 && height > 0 &&
+        difference <= std::max({width, height, expected_width, expected_height}))
+        return;
     std::ostringstream message;
     message << name << " is " << width << "x" << height << ", expected the aspect of "
             << expected_width << "x" << expected_height;

@@ -76,7 +76,8 @@ double ssim(const Image& reference, const Image& registered, const std::uint8_t*
     // A pixel counts where the whole window lies inside the image and is valid.
     cv::Mat inside(reference.height, reference.width, CV_8U, cv::Scalar(255));
     if (valid)
-        for (std::size_t i = 0; i < reference.pixels.size(); ++i) inside.data[i] = valid[i] ? 255 : 0;
+        for (std::size_t i = 0; i < reference.pixels.size(); ++i)
+            inside.data[i] = valid[i] ? 255 : 0;
     cv::erode(inside, inside,
               cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kRadius + 1, 2 * kRadius + 1)),
               cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(0));
@@ -88,8 +89,8 @@ double ssim(const Image& reference, const Image& registered, const std::uint8_t*
             const double ua = ma.at<double>(y, x), ub = mb.at<double>(y, x);
             const double va = aa.at<double>(y, x) - ua * ua, vb = bb.at<double>(y, x) - ub * ub;
             const double vab = ab.at<double>(y, x) - ua * ub;
-            sum += (2 * ua * ub + c1) * (2 * vab + c2) /
-                   ((ua * ua + ub * ub + c1) * (va + vb + c2));
+            sum +=
+                (2 * ua * ub + c1) * (2 * vab + c2) / ((ua * ua + ub * ub + c1) * (va + vb + c2));
             ++count;
         }
     return count > 0 ? sum / static_cast<double>(count) : kNaN;
@@ -122,8 +123,8 @@ double psnr(const Image& reference, const Image& registered, const std::uint8_t*
 namespace {
 
 constexpr int kPatch = 48, kStep = 32, kReach = 14, kBins = 6;
-constexpr int kOwnPeak = 5;           // [px] around the peak that is its own
-constexpr double kStandsOut = 0.03;   // above everything further away
+constexpr int kOwnPeak = 5;          // [px] around the peak that is its own
+constexpr double kStandsOut = 0.03;  // above everything further away
 
 // 6 maps of gradient magnitude by unsigned orientation, clamped and blurred.
 std::array<cv::Mat, kBins> orientation_energy(const cv::Mat& image) {
@@ -199,8 +200,7 @@ cv::Mat patch_scores(const std::array<cv::Mat, kBins>& a, const std::array<cv::M
             const double variance_b = square.at<double>(y, x) - s * s / count;
             const double norm = variance_a * variance_b;
             if (norm > 0)
-                scores.at<double>(y, x) =
-                    (cross.at<double>(y, x) - mean_a * s) / std::sqrt(norm);
+                scores.at<double>(y, x) = (cross.at<double>(y, x) - mean_a * s) / std::sqrt(norm);
         }
     return scores;
 }
@@ -219,13 +219,17 @@ std::vector<PatchShift> patch_residual(const Image& reference, const Image& regi
     cv::Mat invalid;
     if (valid) {
         cv::Mat outside(reference.height, reference.width, CV_8U);
-        for (std::size_t i = 0; i < reference.pixels.size(); ++i) outside.data[i] = valid[i] ? 0 : 1;
+        for (std::size_t i = 0; i < reference.pixels.size(); ++i)
+            outside.data[i] = valid[i] ? 0 : 1;
         cv::integral(outside, invalid, CV_32S);
     }
     // At least this share of a patch, and of the window that it moves in, must be valid.
     constexpr double kMissing = 0.25;
-    const int rows = std::max(0, (reference.height - kPatch - 2 * kReach) / kStep + 1);
-    const int columns = std::max(0, (reference.width - kPatch - 2 * kReach) / kStep + 1);
+    const auto places = [](int size) {
+        const int room = size - kPatch - 2 * kReach;
+        return room < 0 ? 0 : room / kStep + 1;
+    };
+    const int rows = places(reference.height), columns = places(reference.width);
     std::vector<std::vector<PatchShift>> found(rows);
     parallel_ranges(rows, num_threads, [&](int begin, int end) {
         for (int row = begin; row < end; ++row)
@@ -234,10 +238,9 @@ std::vector<PatchShift> patch_residual(const Image& reference, const Image& regi
                 const cv::Rect window(patch.x - kReach, patch.y - kReach, kPatch + 2 * kReach,
                                       kPatch + 2 * kReach);
                 if (valid) {
-                    const int missing = invalid.at<int>(window.br()) -
-                                        invalid.at<int>(window.y, window.br().x) -
-                                        invalid.at<int>(window.br().y, window.x) +
-                                        invalid.at<int>(window.tl());
+                    const int missing =
+                        invalid.at<int>(window.br()) - invalid.at<int>(window.y, window.br().x) -
+                        invalid.at<int>(window.br().y, window.x) + invalid.at<int>(window.tl());
                     if (missing > kMissing * window.area()) continue;
                 }
                 const cv::Mat scores = patch_scores(a, b, patch, window);

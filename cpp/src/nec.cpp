@@ -13,6 +13,9 @@ namespace {
 
 constexpr float kUpperClamp = 5.0f;
 
+// Floats in, double sums.
+inline double squared(double x, double y) { return x * x + y * y; }
+
 // The objective's gradient vector after the soft floor, and d(clamped)/d(gradient):
 //     along n: `along`, across n: `across`.
 struct Clamped {
@@ -32,8 +35,8 @@ struct WarpedRow {
     std::vector<std::uint8_t> validity;
 
     WarpedRow(int width, int count)
-        : u(width), v(width), value(width), du(width), dv(width), derivative(static_cast<std::size_t>(width) * count),
-          validity(width) {}
+        : u(width), v(width), value(width), du(width), dv(width),
+          derivative(static_cast<std::size_t>(width) * count), validity(width) {}
 };
 
 template <int kCount>
@@ -72,8 +75,8 @@ void warp_row(const NecFrame& frame, const Rig& rig, const Reprojection& reproje
 // One pixel whose whole stencil is valid and whose source gradient stands above the floor.
 template <int kCount>
 struct EdgePixel {
-    float reference_x, reference_y;  // a n_R, times the polarity s
-    float source_x, source_y;        // v = b n_S
+    float reference_x, reference_y;             // a n_R, times the polarity s
+    float source_x, source_y;                   // v = b n_S
     float jacobian_x[kCount > 0 ? kCount : 1];  // dv/dp
     float jacobian_y[kCount > 0 ? kCount : 1];
 
@@ -144,10 +147,10 @@ void for_each_pixel(const NecFrame& frame, const Rig& rig, Sink& sink) {
 struct ValueSink {
     double aa = 0, vv = 0, av = 0, magnitudes = 0;
 
-    void valid(float ax, float ay) { aa += ax * ax + ay * ay; }
+    void valid(float ax, float ay) { aa += squared(ax, ay); }
     void edge(const EdgePixel<0>& p) {
-        vv += p.source_x * p.source_x + p.source_y * p.source_y;
-        av += p.reference_x * p.source_x + p.reference_y * p.source_y;
+        vv += squared(p.source_x, p.source_y);
+        av += double(p.reference_x) * p.source_x + double(p.reference_y) * p.source_y;
         magnitudes += p.magnitudes();
     }
     void end_row() {}
@@ -166,7 +169,7 @@ struct GramSink {
     int filled = 0;
 
     explicit GramSink(int width) : tile(kSize, 2 * width) {}
-    void valid(float ax, float ay) { aa += ax * ax + ay * ay; }
+    void valid(float ax, float ay) { aa += squared(ax, ay); }
     void edge(const EdgePixel<kCount>& p) {
         for (int i = 0; i < kCount; ++i) {
             tile(i, filled) = p.jacobian_x[i];
@@ -197,13 +200,13 @@ struct RowsSink {
     std::vector<float> unmatched;  // components of a n_R where the source has no edge
 
     void valid(float ax, float ay) {
-        aa += ax * ax + ay * ay;
+        aa += squared(ax, ay);
         unmatched.push_back(ax);
         unmatched.push_back(ay);
     }
     void edge(const EdgePixel<kCount>& p) {
         unmatched.resize(unmatched.size() - 2);  // it was pushed by valid() just before
-        vv += p.source_x * p.source_x + p.source_y * p.source_y;
+        vv += squared(p.source_x, p.source_y);
         Row x{p.reference_x, p.source_x, {}}, y{p.reference_y, p.source_y, {}};
         std::copy_n(p.jacobian_x, kCount, x.dv.begin());
         std::copy_n(p.jacobian_y, kCount, y.dv.begin());
@@ -219,9 +222,8 @@ NecValue value_from_sums(const NecFrame& frame, double aa, double vv, double av,
     NecValue value;
     value.norm = std::sqrt(aa * vv);
     value.nec = value.norm > 0 ? av / value.norm : 0.0;
-    value.aligned = value.norm > 0
-                        ? (av - kMeanCosine * magnitudes) / ((1 - kMeanCosine) * value.norm)
-                        : 0.0;
+    value.aligned =
+        value.norm > 0 ? (av - kMeanCosine * magnitudes) / ((1 - kMeanCosine) * value.norm) : 0.0;
     value.valid_share = frame.reference_energy > 0 ? aa / frame.reference_energy : 0.0;
     return value;
 }
@@ -309,8 +311,10 @@ double nec(const Image& reference, const Image& registered, const std::uint8_t* 
         const double ga = std::max(std::min<double>(a[i].g, high_a), low_a);
         const double gb = std::max(std::min<double>(b[i].g, high_b), low_b);
         // atan2(0, 0) is 0: a pixel without gradient points along x.
-        const double nax = a[i].g > 0 ? a[i].x / a[i].g : 1.0, nay = a[i].g > 0 ? a[i].y / a[i].g : 0.0;
-        const double nbx = b[i].g > 0 ? b[i].x / b[i].g : 1.0, nby = b[i].g > 0 ? b[i].y / b[i].g : 0.0;
+        const double nax = a[i].g > 0 ? a[i].x / a[i].g : 1.0,
+                     nay = a[i].g > 0 ? a[i].y / a[i].g : 0.0;
+        const double nbx = b[i].g > 0 ? b[i].x / b[i].g : 1.0,
+                     nby = b[i].g > 0 ? b[i].y / b[i].g : 0.0;
         ab += ga * gb * std::abs(nax * nbx + nay * nby);
         aa += ga * ga;
         bb += gb * gb;
@@ -366,7 +370,7 @@ NecFrame make_nec_frame(const Image& reference, const Image& source, const Image
         float& x = frame.reference.x[i];
         float& y = frame.reference.y[i];
         if (depth.pixels[i] <= 0) x = y = 0.0f;
-        frame.reference_energy += x * x + y * y;
+        frame.reference_energy += squared(x, y);
     }
     return frame;
 }

@@ -13,10 +13,9 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 struct Block {
     int first, tangent, ambient;
 };
-constexpr Block kBlocks[] = {
-    {kSourceLogFx, 2, 2},    {kSourceCx, 2, 2},    {kSourceSkew, 1, 1},
-    {kRotationX, 3, 4},      {kTranslationX, 3, 3},
-    {kReferenceLogFx, 2, 2}, {kReferenceCx, 2, 2}, {kReferenceSkew, 1, 1}};
+constexpr Block kBlocks[] = {{kSourceLogFx, 2, 2}, {kSourceCx, 2, 2},     {kSourceSkew, 1, 1},
+                             {kRotationX, 3, 4},   {kTranslationX, 3, 3}, {kReferenceLogFx, 2, 2},
+                             {kReferenceCx, 2, 2}, {kReferenceSkew, 1, 1}};
 constexpr int kRotationBlock = 3;
 constexpr int kNumBlocks = 8;
 
@@ -53,18 +52,17 @@ NecCost::NecCost(const NecFrame& frame, int source_width, int source_height, dou
 }
 
 std::vector<double*> NecCost::blocks(SolverParameters& p) {
-    return {p.source.log_f,  p.source.center,    p.source.skew,      p.quaternion,
-            p.translation,   p.reference.log_f,  p.reference.center, p.reference.skew};
+    return {p.source.log_f, p.source.center,   p.source.skew,      p.quaternion,
+            p.translation,  p.reference.log_f, p.reference.center, p.reference.skew};
 }
 
 bool NecCost::Evaluate(double const* const* parameters, double* residuals,
                        double** jacobians) const {
     SolverParameters p;
     const std::vector<double*> targets = blocks(p);
-    for (int b = 0; b < kNumBlocks; ++b)
-        std::copy_n(parameters[b], kBlocks[b].ambient, targets[b]);
-    const Rig rig = rig_from_solver(p, frame_.depth.width, frame_.depth.height, source_width_,
-                                    source_height_);
+    for (int b = 0; b < kNumBlocks; ++b) std::copy_n(parameters[b], kBlocks[b].ambient, targets[b]);
+    const Rig rig =
+        rig_from_solver(p, frame_.depth.width, frame_.depth.height, source_width_, source_height_);
     const auto cost_of = [this](const NecValue& value) {
         constexpr double kChargeForOverlap = 10.0;
         const double missing = std::max(0.0, minimum_share_ - value.valid_share);
@@ -78,14 +76,18 @@ bool NecCost::Evaluate(double const* const* parameters, double* residuals,
     }
     const NecNormalEquations equations =
         nec_normal_equations(frame_, rig, with_reference_ ? kNumParameters : kNumWithoutReference);
-    // With any amplitude k, r = A / sqrt(k) - s sqrt(k) B has the same cost up to a constant and the
-    // same gradient, and k J^T J for a Hessian. Only edges that have a partner bend the cost, so
-    // the k that predicts it is their share, not 1: about half of what direction alone shows to be
-    // aligned, since some edges coincide by chance. Each step is still tested by its cost.
-    const double amplitude = 0.5 * std::max(equations.value.aligned, 0.1);
+    // With any amplitude k, r = A / sqrt(k) - s sqrt(k) B has the same cost up to a constant and
+    // the same gradient, and k J^T J for a Hessian. Only edges that have a partner bend the cost,
+    // so the k that predicts it is their share, not 1: about half of what direction alone shows to
+    // be aligned, since some edges coincide by chance. Each step is still tested by its cost. Below
+    // g^T H^+ g / 2c the block could not carry the cost.
+    const double cost = cost_of(equations.value);
+    const Eigen::VectorXd explained =
+        compress(weight_ * equations.hessian, weight_ * equations.gradient, 0).residuals;
+    const double amplitude = std::max(0.5 * std::max(equations.value.aligned, 0.1),
+                                      explained.squaredNorm() / (2 * cost));
     const CompressedBlock block =
-        compress(weight_ * amplitude * equations.hessian, weight_ * equations.gradient,
-                 cost_of(equations.value));
+        compress(weight_ * amplitude * equations.hessian, weight_ * equations.gradient, cost);
     std::copy_n(block.residuals.data(), count + 1, residuals);
     for (int b = 0; b < kNumBlocks; ++b) {
         if (!jacobians[b]) continue;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
-#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -16,7 +15,8 @@ inline int resolve_threads(int num_threads) {
     return std::max(1u, std::thread::hardware_concurrency());
 }
 
-// Calls work(begin, end) on consecutive parts of [0, count). The first exception is passed on.
+// Calls work(begin, end) on consecutive parts of [0, count). The exception of
+// the lowest part is passed on, so that it does not depend on the timing.
 template <class Work>
 void parallel_ranges(int count, int num_threads, const Work& work) {
     const int parts = std::min(resolve_threads(num_threads), count);
@@ -24,22 +24,21 @@ void parallel_ranges(int count, int num_threads, const Work& work) {
         if (count > 0) work(0, count);
         return;
     }
-    std::exception_ptr error;
-    std::mutex error_mutex;
+    std::vector<std::exception_ptr> errors(parts);
     const auto guarded = [&](int part) {
         try {
             work(static_cast<int>(static_cast<long>(count) * part / parts),
                  static_cast<int>(static_cast<long>(count) * (part + 1) / parts));
         } catch (...) {
-            const std::lock_guard<std::mutex> lock(error_mutex);
-            if (!error) error = std::current_exception();
+            errors[part] = std::current_exception();
         }
     };
     std::vector<std::thread> threads;
     for (int part = 1; part < parts; ++part) threads.emplace_back(guarded, part);
     guarded(0);
     for (std::thread& thread : threads) thread.join();
-    if (error) std::rethrow_exception(error);
+    for (const std::exception_ptr& error : errors)
+        if (error) std::rethrow_exception(error);
 }
 
 // Calls work(index) for each index of [0, count), whichever thread is free taking the next.

@@ -13,10 +13,8 @@ namespace {
 
 template <class T>
 T rounded(float value) {
-    if constexpr (std::is_floating_point_v<T>)
-        return value;
-    else
-        return static_cast<T>(value + 0.5f);  // a mean of values in range is in range
+    if constexpr (std::is_floating_point_v<T>) return value;
+    else return static_cast<T>(value + 0.5f);  // a mean of values in range is in range
 }
 
 template <class T, int kChannels>
@@ -35,12 +33,12 @@ void sample_row(const ImageView& source, const float* u, const float* v,
         const T* top = reinterpret_cast<const T*>(row) + kChannels * x0;
         const T* bottom = reinterpret_cast<const T*>(row + source.row_bytes) + kChannels * x0;
         for (int c = 0; c < kChannels; ++c) {
-            const float upper = static_cast<float>(top[c]) +
-                                a * (static_cast<float>(top[c + kChannels]) -
-                                     static_cast<float>(top[c]));
-            const float lower = static_cast<float>(bottom[c]) +
-                                a * (static_cast<float>(bottom[c + kChannels]) -
-                                     static_cast<float>(bottom[c]));
+            const float upper =
+                static_cast<float>(top[c]) +
+                a * (static_cast<float>(top[c + kChannels]) - static_cast<float>(top[c]));
+            const float lower =
+                static_cast<float>(bottom[c]) +
+                a * (static_cast<float>(bottom[c + kChannels]) - static_cast<float>(bottom[c]));
             out[c] = rounded<T>(upper + b * (lower - upper));
         }
     }
@@ -63,7 +61,8 @@ RowSampler row_sampler(PixelType type, int channels) {
         case PixelType::u16:
             return colour ? sample_row_erased<std::uint16_t, 3>
                           : sample_row_erased<std::uint16_t, 1>;
-        case PixelType::f32: return colour ? sample_row_erased<float, 3> : sample_row_erased<float, 1>;
+        case PixelType::f32:
+            return colour ? sample_row_erased<float, 3> : sample_row_erased<float, 1>;
     }
     throw std::invalid_argument("unknown pixel type");
 }
@@ -99,8 +98,7 @@ void Registrar::map(const ImageView& depth, float* out) const {
         std::vector<float> u(grid.width), v(grid.width);
         std::vector<std::uint8_t> validity(grid.width);
         for (int y = begin; y < end; ++y) {
-            map_row(reprojection_, grid.row(y), y, grid.width, u.data(), v.data(),
-                    validity.data());
+            map_row(reprojection_, grid.row(y), y, grid.width, u.data(), v.data(), validity.data());
             float* row = out + 2 * static_cast<std::size_t>(y) * grid.width;
             for (int x = 0; x < grid.width; ++x) {
                 row[2 * x] = u[x];

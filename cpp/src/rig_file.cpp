@@ -1,18 +1,20 @@
 #include "xcalib/rig_file.hpp"
 
+#include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <initializer_list>
+#include <iterator>
+#include <locale>
 #include <sstream>
 #include <stdexcept>
 #include <system_error>
-
-#include <unistd.h>
 
 namespace xcalib {
 namespace {
@@ -54,7 +56,9 @@ class Section {
 
     int size(const char* key) const {
         int value = 0;
-        if (!YAML::convert<int>::decode(node_[key], value) || value < 1)
+        const std::string text = node_[key].IsScalar() ? node_[key].Scalar() : "";
+        const char* const end = text.data() + text.size();
+        if (std::from_chars(text.data(), end, value).ptr != end || value < 1)
             fail(key, scalar(node_[key]), "a whole number of px, at least 1");
         return value;
     }
@@ -82,7 +86,10 @@ class Section {
     }
     double number(const char* key, const YAML::Node& node) const {
         double value = 0;
-        if (!YAML::convert<double>::decode(node, value) || !std::isfinite(value))
+        const std::string text = node.IsScalar() ? node.Scalar() : "";
+        const char* const end = text.data() + text.size();
+        if (std::from_chars(text.data(), end, value).ptr != end || text.empty() ||
+            !std::isfinite(value))
             fail(key, scalar(node), "a finite number");
         return value;
     }
@@ -93,8 +100,7 @@ class Section {
 };
 
 Pinhole read_camera(const std::string& path, const char* name, const YAML::Node& node) {
-    const Section section(path, name, node,
-                          {"width", "height", "fx", "fy", "cx", "cy", "skew"});
+    const Section section(path, name, node, {"width", "height", "fx", "fy", "cx", "cy", "skew"});
     Pinhole camera;
     camera.width = section.size("width");
     camera.height = section.size("height");
@@ -143,12 +149,12 @@ Rig parse_rig(const std::string& path, const YAML::Node& root) {
 
 Rig load_rig(const std::string& path) {
     std::ifstream in(path, std::ios::binary);
-    std::stringstream text;
-    // Reading a folder fails only here.
-    if (!in || !(text << in.rdbuf()))
-        throw std::system_error(errno ? errno : EIO, std::generic_category(), path);
+    if (!in) throw std::system_error(errno ? errno : EIO, std::generic_category(), path);
+    if (std::filesystem::is_directory(path))  // opens, but cannot be read
+        throw std::system_error(EISDIR, std::generic_category(), path);
+    const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
     try {
-        return parse_rig(path, YAML::Load(text.str()));
+        return parse_rig(path, YAML::Load(text));
     } catch (const YAML::Exception& error) {
         std::string what = error.what();
         std::replace(what.begin(), what.end(), '\n', ' ');
@@ -160,6 +166,7 @@ void save_rig(const Rig& rig, const std::string& path) {
     rig.validate();
     const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
     std::ostringstream out;
+    out.imbue(std::locale::classic());
     out << "format: xcalib-rig\nversion: 1\n";
     write_camera(out, "reference", rig.reference);
     write_camera(out, "source", rig.source);

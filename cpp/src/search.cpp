@@ -132,8 +132,7 @@ CameraSpectra camera_spectra(const std::vector<Image>& images, const DirectionMa
     std::vector<float> energy(sampler.u.size(), 0.0f), mask;
     for (const Image& image : images) {
         MapEdges edges = draw(image, sampler, map);
-        for (std::size_t i = 0; i < energy.size(); ++i)
-            energy[i] += std::norm(edges.doubled[i]);
+        for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += std::norm(edges.doubled[i]);
         out.frames.push_back(spectrum_of(edges.doubled.data(), map, size));
         mask = std::move(edges.mask);
     }
@@ -224,9 +223,9 @@ std::vector<Peak> peaks_of(const CameraSpectra& reference, const CameraSpectra& 
     if (typical.size() < 9) return {};
     std::nth_element(typical.begin(), typical.begin() + typical.size() / 2, typical.end());
     const double median = typical[typical.size() / 2];
-    // Among misaligned images the value scatters with one over the root of the overlapping energy.
+    // Chance matches grow as the overlap shrinks: what counts is how much of both images agrees.
     const auto z = [&](int y, int x) {
-        return (score.at<float>(y, x) - median) * std::sqrt(overlap.at<float>(y, x));
+        return (score.at<float>(y, x) - median) * overlap.at<float>(y, x);
     };
     std::vector<Peak> peaks;
     const auto wrap = [](int i, int n) { return (i + n) % n; };
@@ -241,8 +240,8 @@ std::vector<Peak> peaks_of(const CameraSpectra& reference, const CameraSpectra& 
             if (!(here > l && here >= r && here > u && here >= d)) continue;
             if (std::min({l, r, u, d}) < 0) continue;  // at the rim of what is allowed
             Peak peak{};
-            peak.dx = signed_shift(x, size.width, source_map.width) - off_x +
-                      parabola_offset(l, here, r);
+            peak.dx =
+                signed_shift(x, size.width, source_map.width) - off_x + parabola_offset(l, here, r);
             peak.dy = signed_shift(y, size.height, source_map.height) - off_y +
                       parabola_offset(u, here, d);
             peak.score = z(y, x);
@@ -325,8 +324,8 @@ std::vector<SearchCandidate> global_search(const std::vector<Image>& references,
         parallel_each(static_cast<int>(hypothesis.sources.size()), num_threads, [&](int s) {
             // One source pixel a map pixel: finer would alias.
             const Pinhole& source = hypothesis.sources[s];
-            const std::vector<Image> source_reduced = reduced_for(
-                sources, source.fx / source.width * sources[0].width * step);
+            const std::vector<Image> source_reduced =
+                reduced_for(sources, source.fx / source.width * sources[0].width * step);
             const Pinhole source_camera =
                 source.resized(source_reduced[0].width, source_reduced[0].height);
             const std::size_t at =
@@ -334,8 +333,8 @@ std::vector<SearchCandidate> global_search(const std::vector<Image>& references,
                 distinct.begin();
             for (std::size_t k = 0; k < space.rolls.size(); ++k) {
                 const Eigen::Matrix3d source_from_map =
-                    space.base * Eigen::AngleAxisd(space.rolls[k], Eigen::Vector3d::UnitZ())
-                                     .toRotationMatrix();
+                    space.base *
+                    Eigen::AngleAxisd(space.rolls[k], Eigen::Vector3d::UnitZ()).toRotationMatrix();
                 const CameraSpectra source_spectra = camera_spectra(
                     source_reduced, source_maps[s], source_camera, source_from_map, sizes[s]);
                 std::vector<Peak> peaks = peaks_of(reference_spectra[at], source_spectra, map,
@@ -364,8 +363,7 @@ std::vector<SearchCandidate> global_search(const std::vector<Image>& references,
         candidate.rig.source = space.hypotheses[peak.reference].sources[peak.source];
         candidate.rig.source_from_reference.rotation = Eigen::Quaterniond(
             space.base *
-            Eigen::AngleAxisd(space.rolls[peak.roll], Eigen::Vector3d::UnitZ())
-                .toRotationMatrix() *
+            Eigen::AngleAxisd(space.rolls[peak.roll], Eigen::Vector3d::UnitZ()).toRotationMatrix() *
             rotation_of_shift(peak.dx, peak.dy, steps[peak.reference]));
         candidate.score = peak.score;
         candidate.correlation = peak.correlation;

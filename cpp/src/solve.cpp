@@ -50,7 +50,6 @@ void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
             problem.SetParameterBlockConstant(block);
 }
 
-
 // Of the free parameters, columns scaled to unit norm: it tells coupled directions, not units.
 double condition_number(ceres::Problem& problem) {
     std::vector<double*> blocks;
@@ -103,8 +102,8 @@ LevelReport solve_level(const Level& level, int stage, double share_limit,
     ceres::Problem problem;
     for (std::size_t i = 0; i < level.frames.size(); ++i)
         problem.AddResidualBlock(
-            new NecCost(level.frames[i], level.source_width, level.source_height,
-                        level.weights[i], share_limit, options.optimize_reference),
+            new NecCost(level.frames[i], level.source_width, level.source_height, level.weights[i],
+                        share_limit, options.optimize_reference),
             nullptr, NecCost::blocks(p));
     if (stage == 1 && options.prior_weight > 0) {
         const auto hold = [&](const double* from, int size, double delta, double* block) {
@@ -123,7 +122,7 @@ LevelReport solve_level(const Level& level, int stage, double share_limit,
     solver.linear_solver_type = ceres::DENSE_QR;
     solver.max_num_iterations = options.max_iterations;
     solver.num_threads = resolve_threads(options.num_threads);
-    solver.function_tolerance = getenv("XC_T") ? atof(getenv("XC_T")) : 1e-5;
+    solver.function_tolerance = level.factor > 1 ? 1e-6 : 5e-6;
     solver.parameter_tolerance = 1e-7;
     solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
@@ -147,6 +146,5 @@ LevelReport solve_level(const Level& level, int stage, double share_limit,
     report.seconds = seconds_now() - start;
     return report;
 }
-
 
 }  // namespace xcalib

@@ -37,7 +37,8 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
     } else if (options.reference_hfov_deg) {
         cameras = {camera_guess(reference, *options.reference_hfov_deg * kDegree)};
     } else {
-        for (double hfov : {40.0, 60.0, 82.0}) cameras.push_back(camera_guess(reference, hfov * kDegree));
+        for (double hfov : {40.0, 60.0, 82.0})
+            cameras.push_back(camera_guess(reference, hfov * kDegree));
     }
     for (const Pinhole& camera : cameras) {
         SearchHypothesis hypothesis{camera, {}};
@@ -92,6 +93,13 @@ WorkingImages some_frames(const WorkingImages& images, std::size_t count) {
 // of the image. Chance grows as the overlap shrinks.
 double merit(const NecValue& value) { return value.aligned * std::sqrt(value.valid_share); }
 
+// Where the field of view of the reference makes no difference, a common one is assumed (50 deg).
+double preference(const Rig& rig) {
+    const double ratio =
+        std::log(rig.reference.width / rig.reference.fx / (2 * std::tan(25 * kDegree)));
+    return 1 - 0.05 * ratio * ratio;
+}
+
 struct Candidate {
     Rig rig;
     double merit = 0.0;
@@ -109,7 +117,8 @@ InverseDepths inverse_depths(const Level& level) {
     std::vector<double> values;
     for (const NecFrame& frame : level.frames)
         for (std::size_t i = 0; i < frame.depth.pixels.size(); ++i)
-            if (frame.depth.pixels[i] > 0 && (frame.reference.x[i] != 0 || frame.reference.y[i] != 0))
+            if (frame.depth.pixels[i] > 0 &&
+                (frame.reference.x[i] != 0 || frame.reference.y[i] != 0))
                 values.push_back(1.0 / frame.depth.pixels[i]);
     if (values.empty()) return {0.0, 0.0, 0.0};
     std::sort(values.begin(), values.end());
@@ -130,9 +139,9 @@ Rig with_parallax(const Rig& rig, const Eigen::Vector3d& t, double inverse_depth
 }
 
 Rig turned(const Rig& rig, const Eigen::Vector3d& rotation) {
-    const Eigen::Quaterniond turn(
-        Eigen::AngleAxisd(rotation.norm(), rotation.norm() > 0 ? Eigen::Vector3d(rotation.normalized())
-                                                               : Eigen::Vector3d::UnitZ()));
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(
+        rotation.norm(),
+        rotation.norm() > 0 ? Eigen::Vector3d(rotation.normalized()) : Eigen::Vector3d::UnitZ()));
     Rig out = rig;
     out.source_from_reference.rotation = (turn * rig.source_from_reference.rotation).normalized();
     out.source_from_reference.translation = turn * rig.t();
@@ -163,7 +172,8 @@ void choose_best(const Level& level, int num_threads, int count, const Variant& 
                  Candidate& candidate) {
     std::vector<double> merits(count);
     parallel_ranges(count, num_threads, [&](int begin, int end) {
-        for (int i = begin; i < end; ++i) merits[i] = merit(pooled(level, variant(i), 1));
+        for (int i = begin; i < end; ++i)
+            merits[i] = preference(variant(i)) * merit(pooled(level, variant(i), 1));
     });
     const int best =
         static_cast<int>(std::max_element(merits.begin(), merits.end()) - merits.begin());
@@ -181,7 +191,8 @@ void place(const Level& level, bool free_focal, const CalibrationOptions& option
     const InverseDepths inverse = inverse_depths(level);
     const double f = level.rig_at(candidate.rig).source.fx;
     const double half = 0.5 * level.width * f / level.rig_at(candidate.rig).reference.fx;
-    candidate.merit = merit(pooled(level, candidate.rig, options.num_threads));
+    candidate.merit =
+        preference(candidate.rig) * merit(pooled(level, candidate.rig, options.num_threads));
     for (int round = 0; round < 2; ++round) {
         if (const double spread = f * (inverse.high - inverse.low); spread > 0) {
             const double step = 1.5 / spread;
@@ -190,7 +201,8 @@ void place(const Level& level, bool free_focal, const CalibrationOptions& option
             choose_best(
                 level, options.num_threads, (2 * kReachX + 1) * (2 * kReachY + 1),
                 [&](int i) {
-                    const int x = i % (2 * kReachX + 1) - kReachX, y = i / (2 * kReachX + 1) - kReachY;
+                    const int x = i % (2 * kReachX + 1) - kReachX,
+                              y = i / (2 * kReachX + 1) - kReachY;
                     return with_parallax(from, Eigen::Vector3d(x * step, y * step, 0),
                                          inverse.median);
                 },
@@ -226,7 +238,8 @@ void place(const Level& level, bool free_focal, const CalibrationOptions& option
         choose_best(
             level, options.num_threads, side * side,
             [&](int i) {  // pan and tilt
-                return turned(after, Eigen::Vector3d((i / side - kReach) / f, (i % side - kReach) / f, 0));
+                return turned(after,
+                              Eigen::Vector3d((i / side - kReach) / f, (i % side - kReach) / f, 0));
             },
             candidate);
     }
@@ -281,7 +294,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     out.search_seconds = seconds_now() - start;
     progress(0.4);
 
-    const std::vector<Step> steps = schedule(images.references[0].width, images.references[0].height);
+    const std::vector<Step> steps =
+        schedule(images.references[0].width, images.references[0].height);
     std::vector<Candidate> candidates;
     for (const SearchCandidate& peak : found) {
         CandidateReport entry;
@@ -294,7 +308,11 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         candidate.entry = out.candidates.size();
         if (initial) candidate.rig.source_from_reference.translation = initial->t();
         const Level level = make_level(images, steps[0].factor, candidate.rig, num_threads);
-        if (searches && !initial) place(level, !options.reference_camera && !options.reference_hfov_deg && !options.source_camera, options, candidate);
+        if (searches && !initial)
+            place(
+                level,
+                !options.reference_camera && !options.reference_hfov_deg && !options.source_camera,
+                options, candidate);
         candidate.share_limit = 0.8 * pooled(level, candidate.rig, num_threads).valid_share;
         candidates.push_back(candidate);
         out.candidates.push_back(entry);
@@ -308,8 +326,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
             keep_best(candidates, steps[s].factor > 4 ? 8 : steps[s].factor > 2 ? 5 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
-            candidate.levels.push_back(solve_level(level, steps[s].stage, candidate.share_limit,
-                                                   options, candidate.rig));
+            candidate.levels.push_back(
+                solve_level(level, steps[s].stage, candidate.share_limit, options, candidate.rig));
             candidate.merit = merit(pooled(level, candidate.rig, num_threads));
             out.candidates[candidate.entry].refined = candidate.rig;
             out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;

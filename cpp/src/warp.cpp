@@ -1,5 +1,6 @@
 #include "xcalib/warp.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include "bilinear.hpp"
@@ -32,11 +33,13 @@ void map_row(const Reprojection& reprojection, const float* depth, int y, int wi
         const float su = (d * (ax * fx + bx) + kx) * inverse;
         const float sv = (d * (ay * fx + by) + ky) * inverse;
         const bool has_depth = d > 0.0f && d <= kMaxDepth;  // false for NaN and inf
-        const bool inside = (z > static_cast<float>(kNearestZ)) & (su >= 0.0f) & (su <= right) &
-                            (sv >= 0.0f) & (sv <= bottom);
+        // A pixel on the rim stays there whatever the last bit of a rounding says.
+        constexpr float kRim = 1e-3f;
+        const bool inside = (z > static_cast<float>(kNearestZ)) & (su >= -kRim) &
+                            (su <= right + kRim) & (sv >= -kRim) & (sv <= bottom + kRim);
         const bool ok = has_depth & inside;
-        u[x] = ok ? su : kNaN;
-        v[x] = ok ? sv : kNaN;
+        u[x] = ok ? std::min(std::max(su, 0.0f), right) : kNaN;
+        v[x] = ok ? std::min(std::max(sv, 0.0f), bottom) : kNaN;
         validity[x] = static_cast<std::uint8_t>(!has_depth ? Validity::no_depth
                                                 : inside   ? Validity::valid
                                                            : Validity::outside);

@@ -65,14 +65,14 @@ constexpr int kFinest = 2;
 }  // namespace
 
 void validate_frames(const std::vector<ImageView>& references,
-                     const std::vector<ImageView>& sources,
-                     const std::vector<ImageView>& depths) {
-    if (references.empty()) throw std::invalid_argument("no image pairs were given, expected at least 1");
+                     const std::vector<ImageView>& sources, const std::vector<ImageView>& depths) {
+    if (references.empty())
+        throw std::invalid_argument("no image pairs were given, expected at least 1");
     if (references.size() != sources.size() || references.size() != depths.size())
-        throw std::invalid_argument(
-            "got " + std::to_string(references.size()) + " references, " +
-            std::to_string(sources.size()) + " sources and " + std::to_string(depths.size()) +
-            " depth maps, expected as many of each");
+        throw std::invalid_argument("got " + std::to_string(references.size()) + " references, " +
+                                    std::to_string(sources.size()) + " sources and " +
+                                    std::to_string(depths.size()) +
+                                    " depth maps, expected as many of each");
     require_one_size("reference", references);
     require_one_size("source", sources);
     for (std::size_t i = 0; i < depths.size(); ++i)
@@ -141,8 +141,7 @@ Level make_level(const WorkingImages& images, int factor, const Rig& rig, int nu
                 gaussian_blur(resize_area(images.references[i], level.width, level.height),
                               reference_blur),
                 gaussian_blur(
-                    resize_area(images.sources[i], level.source_width, level.source_height),
-                    kBlur),
+                    resize_area(images.sources[i], level.source_width, level.source_height), kBlur),
                 factor <= kFinest ? without_depth_edges(depth) : depth, at_level);
             level.weights[i] = evaluate_nec(level.frames[i], at_level).norm;
         }

@@ -27,12 +27,14 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
 // One level of the pyramid, made for the scale between the cameras that `rig` has.
 struct Level {
     int factor = 1;
-    int width = 0, height = 0;                // of the reference
+    int width = 0, height = 0;  // of the reference
     int source_width = 0, source_height = 0;
     std::vector<NecFrame> frames;
-    std::vector<double> weights;              // c_i / sum c_i at `rig`
+    std::vector<double> weights;  // c_i / sum c_i at `rig`
 
-    Rig rig_at(const Rig& rig) const { return rig.resized(width, height, source_width, source_height); }
+    Rig rig_at(const Rig& rig) const {
+        return rig.resized(width, height, source_width, source_height);
+    }
 };
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 

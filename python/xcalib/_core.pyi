@@ -230,6 +230,12 @@ class CalibrationReport:
     def baseline_nec(self) -> float:
         """Typical of rigs displaced by many pixels."""
     @property
+    def contrast(self) -> float:
+        """Of the NEC above the baseline, in deviations over displacements."""
+    @property
+    def repeatability_px(self) -> float:
+        """Median distance between fits to two halves of the frames [working px]."""
+    @property
     def valid_share(self) -> float:
         """Of the reference's edge energy."""
     @property

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -11,6 +12,7 @@
 
 #include "xcalib/camera.hpp"
 #include "xcalib/image.hpp"
+#include "xcalib/nec.hpp"
 #include "xcalib/warp.hpp"
 
 namespace xcalib::testing {
@@ -120,6 +122,53 @@ inline Image source_view(const Rig& rig, const Field& texture, const Field& dept
     return image;
 }
 
+// A pair on which 1 - NEC is as smooth as bilinear interpolation lets it be: every edge lies
+// between the floor and the cap of the objective (or, `saturated`, above the cap), every polarity
+// is the same throughout, and every pixel has its place within the source, some pixels from the
+// border.
+struct SmoothPair {
+    Rig rig;
+    NecFrame frame;
+};
+
+inline SmoothPair smooth_pair(unsigned seed, bool saturated) {
+    std::mt19937 random(seed);
+    constexpr int kWidth = 40, kHeight = 30, kSourceWidth = 431, kSourceHeight = 345;
+    // A ramp, and waves on it that bend it by less than half.
+    struct Wave {
+        double kx, ky, phase, height;
+    };
+    std::vector<Wave> waves;
+    for (int i = 0; i < 6; ++i) {
+        const double k = uniform(random, 9, 25) / kWidth, direction = uniform(random, 0, 6.28);
+        waves.push_back({k * std::cos(direction), k * std::sin(direction), uniform(random, 0, 6.28),
+                         0.08 / (kWidth * k)});
+    }
+    const Field texture = [waves](double x, double y) {
+        double value = ((x - kWidth / 2) + 0.3 * (y - kHeight / 2)) / kWidth;
+        for (const Wave& w : waves) value += w.height * std::sin(w.kx * x + w.ky * y + w.phase);
+        return value;
+    };
+    SmoothPair pair;
+    pair.rig = random_rig(random, kWidth, kHeight, kSourceWidth, kSourceHeight);
+    pair.rig.source.fx *= 0.6;
+    pair.rig.source.fy *= 0.6;
+    // The source sees the texture where it would be at infinity, turned by a little: some pixels
+    // off.
+    const Eigen::Matrix3d back =
+        infinite_homography(turned(pair.rig, {0.02, -0.03, 0.02})).inverse();
+    const Image source = drawn(
+        [&](double u, double v) {
+            const Eigen::Vector2d x = (back * Eigen::Vector3d(u, v, 1)).hnormalized();
+            return (saturated ? -1 : 1) * texture(x.x(), x.y());  // reversed, for a change
+        },
+        kSourceWidth, kSourceHeight);
+    pair.frame = make_nec_frame(drawn(texture, kWidth, kHeight), source,
+                                drawn(rolling_depth(kWidth, kHeight), kWidth, kHeight), pair.rig);
+    pair.frame.source_mean /= saturated ? 12.0f : 2.5f;
+    return pair;
+}
+
 // A rig moved by `step` along one parameter, in the solver's scaling.
 inline Rig moved(const Rig& rig, int parameter, double step) {
     if (parameter >= kRotationX && parameter <= kRotationZ) {
@@ -133,14 +182,23 @@ inline Rig moved(const Rig& rig, int parameter, double step) {
                                   &camera.center[1], &camera.skew[0]};
         *fields[which] += step;
     };
-    if (parameter >= kReferenceLogFx)
-        in_camera(p.reference, parameter - kReferenceLogFx);
-    else if (parameter >= kTranslationX)
-        p.translation[parameter - kTranslationX] += step;
-    else
-        in_camera(p.source, parameter - kSourceLogFx);
+    if (parameter >= kReferenceLogFx) in_camera(p.reference, parameter - kReferenceLogFx);
+    else if (parameter >= kTranslationX) p.translation[parameter - kTranslationX] += step;
+    else in_camera(p.source, parameter - kSourceLogFx);
     return rig_from_solver(p, rig.reference.width, rig.reference.height, rig.source.width,
                            rig.source.height);
+}
+
+// The farthest that any pixel of the reference moves by a unit of the parameter [px of the source].
+inline double farthest_move(const Rig& rig, int parameter) {
+    double farthest = 0;
+    for (const double y : {0.0, 0.5, 1.0})
+        for (const double x : {0.0, 0.5, 1.0})
+            farthest = std::max(farthest, warp_jacobian(rig, x * (rig.reference.width - 1),
+                                                        y * (rig.reference.height - 1), 3.0)
+                                              .col(parameter)
+                                              .norm());
+    return farthest;
 }
 
 // The classes of parameters that derivatives are judged by.

@@ -1,1 +1,254 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <locale>
+#include <string>
+#include <system_error>
+
+#include "refusal.hpp"
+#include "scenes.hpp"
+#include "xcalib/rig_file.hpp"
+
+namespace xcalib {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace ::xcalib::testing;  // NOLINT: scenes.hpp, refusal.hpp
+
+const char* const kText = R"(format: xcalib-rig
+version: 1
+reference:
+  width: 640
+  height: 480
+  fx: 600
+  fy: 601.5
+  cx: 319.5
+  cy: 239.5
+  skew: 0
+source:
+  width: 320
+  height: 256
+  fx: 300
+  fy: 300
+  cx: 160
+  cy: 128
+  skew: 0.25
+source_from_reference:
+  quaternion_wxyz: [1, 0, 0, 0]
+  translation_m: [0.1, -0.2, 0.3]
+)";
+
+class RigFile : public ::testing::Test {
+   protected:
+    void SetUp() override {
+        folder_ = fs::temp_directory_path() /
+                  ("xcalib_rig_file_" + std::to_string(::getpid()) + "_" +
+                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
+        fs::create_directories(folder_);
+        path_ = (folder_ / "rig.yaml").string();
+    }
+    void TearDown() override { fs::remove_all(folder_); }
+
+    // kText with `from` replaced by `to`, written to path_.
+    void write_with(const std::string& from, const std::string& to) {
+        std::string text = kText;
+        const std::size_t at = text.find(from);
+        ASSERT_NE(at, std::string::npos) << from;
+        std::ofstream(path_) << text.replace(at, from.size(), to);
+    }
+
+    std::string refusal_with(const std::string& from, const std::string& to) {
+        write_with(from, to);
+        const std::string message = refusal([&] { load_rig(path_); });
+        EXPECT_TRUE(has(message, path_)) << "where '" << from << "' became '" << to << "'";
+        EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+        return message;
+    }
+
+    std::size_t files() const {
+        return static_cast<std::size_t>(
+            std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+    }
+
+    fs::path folder_;
+    std::string path_;
+};
+
+void expect_identical(const Rig& a, const Rig& b) {
+    for (const auto& [x, y] : {std::pair{a.reference, b.reference}, {a.source, b.source}}) {
+        EXPECT_EQ(x.width, y.width);
+        EXPECT_EQ(x.height, y.height);
+        EXPECT_EQ(x.fx, y.fx);
+        EXPECT_EQ(x.fy, y.fy);
+        EXPECT_EQ(x.cx, y.cx);
+        EXPECT_EQ(x.cy, y.cy);
+        EXPECT_EQ(x.skew, y.skew);
+    }
+    EXPECT_EQ(a.source_from_reference.rotation.coeffs(), b.source_from_reference.rotation.coeffs());
+    EXPECT_EQ(a.t(), b.t());
+}
+
+TEST_F(RigFile, ReadsTheDocumentedFormat) {
+    std::ofstream(path_) << kText;
+    const Rig rig = load_rig(path_);
+    EXPECT_EQ(rig.reference.width, 640);
+    EXPECT_EQ(rig.reference.fy, 601.5);
+    EXPECT_EQ(rig.source.height, 256);
+    EXPECT_EQ(rig.source.skew, 0.25);
+    EXPECT_EQ(rig.t(), Eigen::Vector3d(0.1, -0.2, 0.3));
+    EXPECT_EQ(rig.R(), Eigen::Matrix3d::Identity());
+}
+
+TEST_F(RigFile, TheQuaternionIsWFirst) {
+    write_with("[1, 0, 0, 0]", "[0, 0, 0, 1]");  // half a turn about z
+    EXPECT_LT((load_rig(path_).R() * Eigen::Vector3d(1, 2, 3) - Eigen::Vector3d(-1, -2, 3)).norm(),
+              1e-15);
+}
+
+TEST_F(RigFile, ComesBackBitByBit) {
+    std::mt19937 random(1);
+    for (int i = 0; i < 50; ++i) {
+        Rig rig = random_rig(random, 1280, 960, 640, 512);
+        rig.source_from_reference.translation.z() = std::ldexp(uniform(random, -1, 1), -40);
+        save_rig(rig, path_);
+        expect_identical(load_rig(path_), rig);
+    }
+    EXPECT_EQ(files(), 1u) << "nothing but the file is left";
+}
+
+TEST_F(RigFile, ReplacesAnOlderFile) {
+    std::ofstream(path_) << "something longer than a rig file could ever be\n" << kText << kText;
+    std::mt19937 random(2);
+    const Rig rig = random_rig(random, 640, 480, 320, 256);
+    save_rig(rig, path_);
+    expect_identical(load_rig(path_), rig);
+}
+
+TEST_F(RigFile, AMissingFieldIsNamed) {
+    EXPECT_TRUE(has(refusal_with("  fx: 600\n", ""), "fx"));
+    EXPECT_TRUE(has(refusal_with("  skew: 0\n", ""), "skew"));
+    EXPECT_TRUE(has(refusal_with("version: 1\n", ""), "version"));
+    EXPECT_TRUE(has(refusal_with("  translation_m: [0.1, -0.2, 0.3]\n", ""), "translation_m"));
+    EXPECT_TRUE(has(refusal_with("source_from_reference:", "pose:"), "pose"));
+}
+
+TEST_F(RigFile, AnExtraFieldIsNamed) {
+    EXPECT_TRUE(has(refusal_with("version: 1\n", "version: 1\nauthor: me\n"), "author"));
+    EXPECT_TRUE(has(refusal_with("  fx: 600\n", "  fx: 600\n  k1: 0.1\n"), "k1"));
+}
+
+TEST_F(RigFile, ANumberThatIsNotFiniteIsNamedWithItsValue) {
+    for (const char* value : {".nan", ".inf", "-.inf", "many", "[1]", "1e999", ""}) {
+        const std::string message = refusal_with("fx: 600\n", "fx: " + std::string(value) + "\n");
+        EXPECT_TRUE(has(message, "fx")) << value;
+        EXPECT_TRUE(has(message, "expected")) << value;
+    }
+    EXPECT_TRUE(has(refusal_with("[0.1, -0.2, 0.3]", "[0.1, .nan, 0.3]"), "translation_m"));
+    EXPECT_TRUE(has(refusal_with("[1, 0, 0, 0]", "[1, 0, 0, .inf]"), "quaternion_wxyz"));
+}
+
+TEST_F(RigFile, AListOfTheWrongLengthIsNamedWithItsLength) {
+    const std::string message = refusal_with("[0.1, -0.2, 0.3]", "[0.1, -0.2]");
+    EXPECT_TRUE(has(message, "translation_m"));
+    EXPECT_TRUE(has(message, "2"));
+    EXPECT_TRUE(has(message, "3 numbers"));
+    EXPECT_TRUE(has(refusal_with("[1, 0, 0, 0]", "1"), "quaternion_wxyz"));
+}
+
+TEST_F(RigFile, ImpossibleValuesAreNamed) {
+    EXPECT_TRUE(has(refusal_with("fx: 600", "fx: -600"), "fx = -600"));
+    EXPECT_TRUE(has(refusal_with("width: 640", "width: 0"), "width = 0"));
+    EXPECT_TRUE(has(refusal_with("width: 640", "width: 640.5"), "width = 640.5"));
+    EXPECT_TRUE(has(refusal_with("[1, 0, 0, 0]", "[0, 0, 0, 0]"), "quaternion"));
+    EXPECT_TRUE(has(refusal_with("[1, 0, 0, 0]", "[2, 0, 0, 0]"), "quaternion"));
+}
+
+TEST_F(RigFile, AnotherVersionOrFormatIsNamed) {
+    const std::string message = refusal_with("version: 1", "version: 2");
+    EXPECT_TRUE(has(message, "version = 2, expected 1"));
+    EXPECT_TRUE(has(refusal_with("xcalib-rig", "kalibr"), "kalibr"));
+}
+
+TEST_F(RigFile, WhatIsNotARigFileIsRefusedWithItsPath) {
+    for (const char* text : {"", "just words", "- a\n- b\n", "{", "a: [1, 2", "\x01\x02\xff",
+                             "[1]: 2\n", "format: xcalib-rig\nversion: [1]\n"}) {
+        std::ofstream(path_) << text;
+        const std::string message = refusal([&] { load_rig(path_); });
+        EXPECT_TRUE(has(message, path_)) << "'" << text << "'";
+        EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+    }
+}
+
+TEST_F(RigFile, WhatCannotBeReadIsASystemErrorWithItsPath) {
+    const std::string missing = (folder_ / "missing.yaml").string();
+    try {
+        load_rig(missing);
+        ADD_FAILURE() << "read a missing file";
+    } catch (const std::system_error& error) {
+        EXPECT_EQ(error.code(), std::errc::no_such_file_or_directory);
+        EXPECT_TRUE(has(error.what(), missing));
+    }
+    try {
+        load_rig(folder_.string());
+        ADD_FAILURE() << "read a folder";
+    } catch (const std::system_error& error) {
+        EXPECT_EQ(error.code(), std::errc::is_a_directory) << error.what();
+        EXPECT_TRUE(has(error.what(), folder_.string()));
+    }
+}
+
+TEST_F(RigFile, WhatCannotBeWrittenIsASystemErrorAndLeavesNothing) {
+    std::mt19937 random(3);
+    const Rig rig = random_rig(random, 640, 480, 320, 256);
+    const std::string nowhere = (folder_ / "missing" / "rig.yaml").string();
+    try {
+        save_rig(rig, nowhere);
+        ADD_FAILURE() << "wrote into a missing folder";
+    } catch (const std::system_error& error) {
+        EXPECT_EQ(error.code(), std::errc::no_such_file_or_directory);
+        EXPECT_TRUE(has(error.what(), nowhere));
+    }
+    EXPECT_EQ(files(), 0u);
+    EXPECT_THROW(save_rig(rig, folder_.string()), std::system_error);  // a folder of that name
+    EXPECT_EQ(files(), 0u);
+    for (const auto& entry : fs::directory_iterator(folder_.parent_path()))
+        EXPECT_FALSE(has(entry.path().string(), folder_.string() + ".part"));
+}
+
+TEST_F(RigFile, ARigThatIsNotValidIsNotWritten) {
+    std::mt19937 random(4);
+    Rig rig = random_rig(random, 640, 480, 320, 256);
+    rig.source.fx = -1;
+    EXPECT_TRUE(has(refusal([&] { save_rig(rig, path_); }), "source: fx = -1"));
+    EXPECT_EQ(files(), 0u);
+}
+
+// A comma for the decimal point and dots between thousands, as in much of Europe.
+class Continental : public std::numpunct<char> {
+   protected:
+    char do_decimal_point() const override { return ','; }
+    char do_thousands_sep() const override { return '.'; }
+    std::string do_grouping() const override { return "\3"; }
+};
+
+TEST_F(RigFile, TheProgramsLocaleHasNoSay) {
+    std::mt19937 random(5);
+    Rig rig = random_rig(random, 1280, 960, 640, 512);
+    rig.source_from_reference.translation.x() = 1234.5;
+    const std::locale before = std::locale::global(std::locale(std::locale(), new Continental));
+    try {
+        save_rig(rig, path_);
+        expect_identical(load_rig(path_), rig);
+    } catch (const std::exception& error) {
+        ADD_FAILURE() << error.what();
+    }
+    std::locale::global(before);
+    EXPECT_EQ(refusal([&] { expect_identical(load_rig(path_), rig); }), "");
+}
+
+}  // namespace
+}  // namespace xcalib

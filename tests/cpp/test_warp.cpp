@@ -66,7 +66,9 @@ TEST(MapRow, AgreesWithProjectingUnprojectedPointsInDouble) {
             if (inside) {
                 ASSERT_EQ(row.validity[x], kValid);
             }
-            if (outside) ASSERT_EQ(row.validity[x], kOutside);
+            if (outside) {
+                ASSERT_EQ(row.validity[x], kOutside);
+            }
             if (row.validity[x] != kValid) continue;
             ++valid;
             ASSERT_NEAR(row.u[x], expected.x(), 1e-3);

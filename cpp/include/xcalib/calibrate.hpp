@@ -23,19 +23,19 @@ enum class SearchMode {
 
 struct SearchOptions {
     SearchMode mode = SearchMode::automatic;
-    double max_fov_ratio = 2.5;   // of the tangents, either way, (1, 10]
-    double max_roll_deg = 6.0;    // [deg], >= 0
-    double min_overlap = 0.3;     // (0, 1): geometric mean of the shares of both images' edges
-    int map_width = 96;           // [px], >= 32
-    int candidates = 16;          // peaks considered, >= 1
+    double max_fov_ratio = 2.5;  // of the tangents, either way, (1, 10]
+    double max_roll_deg = 6.0;   // [deg], >= 0
+    double min_overlap = 0.3;    // (0, 1): geometric mean of the shares of both images' edges
+    int map_width = 96;          // [px], >= 32
+    int candidates = 16;         // peaks considered, >= 1
 };
 
 struct CalibrationOptions {
-    int max_frames = 32;      // pairs used, spread over the footage, >= 1
-    std::uint32_t seed = 0;   // of the frame choice
-    int num_threads = 0;      // 0: every core
-    int working_width = 640;  // [px]: references are reduced by a whole factor to at most this
-    int max_iterations = 30;  // per stage and level, >= 1
+    int max_frames = 32;        // pairs used, spread over the footage, >= 1
+    std::uint32_t seed = 0;     // of the frame choice
+    int num_threads = 0;        // 0: every core
+    int working_width = 640;    // [px]: references are reduced by a whole factor to at most this
+    int max_iterations = 100;   // per stage and level, >= 1
     double prior_weight = 1.0;  // gamma of Eq. (total_loss), stage 1 only, >= 0
 
     // Known intrinsics are taken as they are and frozen.
@@ -57,8 +57,8 @@ struct LevelReport {
     int width = 0, height = 0;
     int iterations = 0;
     double initial_cost = 0.0, final_cost = 0.0;  // Eq. (image_loss), plus the prior in stage 1
-    double nec = 0.0;          // mean over the pairs, weighted by c_i
-    double valid_share = 0.0;  // of the reference's edge energy that the source covers
+    double nec = 0.0;                             // mean over the pairs, weighted by c_i
+    double valid_share = 0.0;       // of the reference's edge energy that the source covers
     double condition_number = 0.0;  // of the normal equations, columns scaled to unit norm
     double seconds = 0.0;
     std::string stopped;  // why
@@ -66,21 +66,23 @@ struct LevelReport {
 
 struct CandidateReport {
     double score = 0.0, correlation = 0.0, overlap = 0.0;  // as the search found it
-    double refined_nec = 0.0;  // after refinement at the coarse level
-    Rig found;    // by the search
-    Rig refined;  // after refinement at the coarse level
+    double refined_nec = 0.0;                              // after refinement at the coarse level
+    Rig found;                                             // by the search
+    Rig refined;                                           // after refinement at the coarse level
 };
 
 struct CalibrationReport {
     bool converged = false;
-    std::string message;      // one line: why the result is, or is not, to be trusted
+    std::string message;  // one line: why the result is, or is not, to be trusted
     double seconds = 0.0;
     double search_seconds = 0.0;
     int working_width = 0, working_height = 0;
-    double nec = 0.0;          // at the finest level
-    double baseline_nec = 0.0; // there, typical of rigs displaced by many pixels
+    double nec = 0.0;               // at the finest level
+    double baseline_nec = 0.0;      // at half that size, of the rig turned off its place
+    double contrast = 0.0;          // of the NEC above that, in its deviations over displacements
+    double repeatability_px = 0.0;  // between fits to two halves of the frames [working px]
     double valid_share = 0.0;
-    std::vector<int> frames;   // indices of the pairs used
+    std::vector<int> frames;  // indices of the pairs used
     std::vector<CandidateReport> candidates;
     std::vector<LevelReport> levels;
 

@@ -42,8 +42,9 @@ struct Image {
     float* row(int y) { return pixels.data() + static_cast<std::size_t>(y) * width; }
     const float* row(int y) const { return pixels.data() + static_cast<std::size_t>(y) * width; }
     ImageView view() const {
-        return {pixels.data(), width, height, 1, PixelType::f32,
-                static_cast<std::ptrdiff_t>(width * sizeof(float))};
+        return {pixels.data(),  width,
+                height,         1,
+                PixelType::f32, static_cast<std::ptrdiff_t>(width * sizeof(float))};
     }
 };
 
@@ -62,7 +63,8 @@ Image gaussian_blur(const Image& image, double sigma_px);
 Image normalize_percentiles(const Image& image);
 
 // The same, then log(1 + k x) / log(1 + k) with the k that takes the median to 0.4 (none where it
-// lies above already): night images keep their detail in the lowest few per cent of the range.
+// lies above already, at most 100): night images keep their detail in the lowest few per cent of
+// the range.
 Image normalize_dark(const Image& image);
 
 // A copy in which everything that is not a depth (0, negative, NaN, inf) is 0.

@@ -40,10 +40,10 @@ float mean_gradient(const Image& image, const std::uint8_t* validity);
 
 // One pair of the objective at one pyramid level. Everything is held but the rig.
 struct NecFrame {
-    EdgeField reference;       // zero where depth is unknown
-    Image depth;               // on the reference's grid [m]
+    EdgeField reference;  // zero where depth is unknown
+    Image depth;          // on the reference's grid [m]
     Image source;
-    float source_mean = 0.0f;  // m of the warped source, held through a level
+    float source_mean = 0.0f;       // m of the warped source, held through a level
     double reference_energy = 0.0;  // sum of |reference|^2
 };
 

@@ -32,8 +32,8 @@ struct SearchSpace {
 };
 
 struct SearchCandidate {
-    Rig rig;              // zero translation
-    double score = 0.0;   // correlation above the typical at this scale, times sqrt(overlap)
+    Rig rig;                   // zero translation
+    double score = 0.0;        // correlation above the typical at this scale, times overlap
     double correlation = 0.0;  // pooled, of doubled angles, in [-1, 1]
     double overlap = 0.0;
 };

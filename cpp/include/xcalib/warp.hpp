@@ -34,6 +34,7 @@ void map_row(const Reprojection& reprojection, const float* depth, int y, int wi
 
 // The parameters of a rig in the order of every Jacobian of this library, scaled as
 // SolverParameters: source camera, rotation (R <- exp(w) R), translation, reference camera.
+// clang-format off
 enum Parameter : int {
     kSourceLogFx, kSourceLogFy, kSourceCx, kSourceCy, kSourceSkew,
     kRotationX, kRotationY, kRotationZ,
@@ -41,6 +42,7 @@ enum Parameter : int {
     kReferenceLogFx, kReferenceLogFy, kReferenceCx, kReferenceCy, kReferenceSkew,
     kNumParameters
 };
+// clang-format on
 inline constexpr int kNumWithoutReference = kReferenceLogFx;
 
 // Chain rule through Eq. (3d_mapping): the derivative of any f(x_S), given df/du and df/dv, by the
@@ -64,8 +66,8 @@ class ProjectionDerivative {
         const float rz = R_(2, 0) * xr + R_(2, 1) * yr + R_(2, 2) * depth;
         const float inverse_z = 1.0f / (rz + t_.z());
         const float x = (rx + t_.x()) * inverse_z, y = (ry + t_.y()) * inverse_z;
-        const float dx = df_du * fx_;                   // df/dx, x = X_S / Z_S
-        const float dy = df_du * skew_ + df_dv * fy_;   // df/dy
+        const float dx = df_du * fx_;                  // df/dx, x = X_S / Z_S
+        const float dy = df_du * skew_ + df_dv * fy_;  // df/dy
         out[kSourceLogFx * stride] = dx * x;
         out[kSourceLogFy * stride] = df_dv * fy_ * y;
         out[kSourceCx * stride] = df_du * width_;

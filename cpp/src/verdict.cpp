@@ -1,0 +1,139 @@
+#include "verdict.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "solve.hpp"
+#include "xcalib/warp.hpp"
+
+namespace xcalib {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Half resolution: fine enough to tell a fit from a near miss, a quarter of the cost.
+constexpr int kFactor = 2;
+
+Rig panned(const Rig& rig, double x, double y) {
+    Rig out = rig;
+    out.source_from_reference.rotation =
+        Eigen::Quaterniond(Eigen::AngleAxisd(-y, Eigen::Vector3d::UnitX()) *
+                           Eigen::AngleAxisd(x, Eigen::Vector3d::UnitY())) *
+        rig.source_from_reference.rotation;
+    return out;
+}
+
+// NEC of the same rig turned off its place: what the footage gives where nothing is aligned.
+struct Baseline {
+    double mean, deviation;
+};
+
+Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
+    constexpr int kDirections = 8;
+    const double width = rig.reference.width / rig.reference.fx;  // of the image, as an angle
+    std::vector<double> values;
+    for (double radius : {0.04, 0.07, 0.10})
+        for (int i = 0; i < kDirections; ++i) {
+            const double angle = 2 * kPi * i / kDirections;
+            values.push_back(pooled(level,
+                                    panned(rig, radius * width * std::cos(angle),
+                                           radius * width * std::sin(angle)),
+                                    num_threads)
+                                 .nec);
+        }
+    Baseline out{0, 0};
+    for (double v : values) out.mean += v / static_cast<double>(values.size());
+    for (double v : values)
+        out.deviation += (v - out.mean) * (v - out.mean) / static_cast<double>(values.size() - 1);
+    out.deviation = std::sqrt(out.deviation);
+    return out;
+}
+
+WorkingImages every_second(const WorkingImages& images, std::size_t first) {
+    WorkingImages out;
+    for (std::size_t i = first; i < images.references.size(); i += 2) {
+        out.references.push_back(images.references[i]);
+        out.sources.push_back(images.sources[i]);
+        out.depths.push_back(images.depths[i]);
+    }
+    return out;
+}
+
+// Median distance between where two rigs send the pixels of a level, in reference pixels of the
+// working size.
+double median_distance(const Level& level, const Rig& a, const Rig& b) {
+    const Reprojection to_a(level.rig_at(a)), to_b(level.rig_at(b));
+    const double scale = level.factor * level.rig_at(a).reference.fx / level.rig_at(a).source.fx;
+    std::vector<double> distances;
+    std::vector<float> ua(level.width), va(level.width), ub(level.width), vb(level.width);
+    std::vector<std::uint8_t> ok_a(level.width), ok_b(level.width);
+    for (const NecFrame& frame : level.frames)
+        for (int y = 0; y < level.height; y += 8) {
+            map_row(to_a, frame.depth.row(y), y, level.width, ua.data(), va.data(), ok_a.data());
+            map_row(to_b, frame.depth.row(y), y, level.width, ub.data(), vb.data(), ok_b.data());
+            for (int x = 0; x < level.width; x += 8)
+                if ((ok_a[x] | ok_b[x]) == 0)
+                    distances.push_back(scale * std::hypot(ua[x] - ub[x], va[x] - vb[x]));
+        }
+    if (distances.empty()) return INFINITY;
+    std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
+    return distances[distances.size() / 2];
+}
+
+template <class... Values>
+std::string format(const char* pattern, Values... values) {
+    char buffer[256];
+    std::snprintf(buffer, sizeof buffer, pattern, values...);
+    return buffer;
+}
+
+}  // namespace
+
+void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
+           CalibrationReport& report) {
+    constexpr double kContrast = 6.0, kRepeatability = 1.0, kShare = 0.05;
+    const Level level = make_level(images, kFactor, rig, options.num_threads);
+    const double here = pooled(level, rig, options.num_threads).nec;
+    const Baseline baseline = displaced(level, rig, options.num_threads);
+    report.baseline_nec = baseline.mean;
+    report.contrast = baseline.deviation > 0 ? (here - baseline.mean) / baseline.deviation : 0.0;
+
+    const std::size_t pairs = images.references.size();
+    report.repeatability_px = INFINITY;
+    if (pairs >= 2) {
+        Rig halves[2] = {rig, rig};
+        for (std::size_t k = 0; k < 2; ++k)
+            solve_level(make_level(every_second(images, k), kFactor, rig, options.num_threads), 2,
+                        0.8 * report.valid_share, options, halves[k]);
+        report.repeatability_px = median_distance(level, halves[0], halves[1]);
+    }
+
+    report.converged = false;
+    if (pairs < 2) report.message = "1 image pair is too few to trust, expected at least 2";
+    else if (report.valid_share < kShare)
+        report.message = format(
+            "the source covers %.0f %% of the reference's edges, expected at "
+            "least %.0f %%",
+            100 * report.valid_share, 100 * kShare);
+    else if (report.contrast < kContrast)
+        report.message = format(
+            "edges agree hardly better than displaced ones: NEC stands out by "
+            "%.1f deviations, expected at least %.0f",
+            report.contrast, kContrast);
+    else if (report.repeatability_px > kRepeatability)
+        report.message = format(
+            "two halves of the frames disagree by %.2f px, expected at most "
+            "%.1f",
+            report.repeatability_px, kRepeatability);
+    else {
+        report.converged = true;
+        report.message = format(
+            "NEC stands out by %.1f deviations, two halves of the frames agree "
+            "to %.2f px",
+            report.contrast, report.repeatability_px);
+    }
+}
+
+}  // namespace xcalib

@@ -1,0 +1,13 @@
+// Is a calibration to be trusted? Judged from the footage alone.
+#pragma once
+
+#include "working_images.hpp"
+#include "xcalib/calibrate.hpp"
+
+namespace xcalib {
+
+// Fills converged, message, baseline_nec, contrast and repeatability_px of the report.
+void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
+           CalibrationReport& report);
+
+}  // namespace xcalib
