@@ -35,9 +35,9 @@ void gray_rows(const ImageView& image, float scale, Image& gray) {
     }
 }
 
-// A sample of about 100 000 pixels is enough for percentiles and costs little.
+// A sample of about 20 000 pixels is enough for percentiles and costs little.
 std::vector<float> sorted_sample(const Image& image) {
-    const std::size_t step = std::max<std::size_t>(1, image.pixels.size() / 100000);
+    const std::size_t step = std::max<std::size_t>(1, image.pixels.size() / 20000);
     std::vector<float> sample;
     sample.reserve(image.pixels.size() / step + 1);
     for (std::size_t i = 0; i < image.pixels.size(); i += step) sample.push_back(image.pixels[i]);

@@ -66,8 +66,8 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
         space.hypotheses.push_back(hypothesis);
     }
     const double max_roll = (local ? 3.0 : options.search.max_roll_deg) * kDegree;
-    const int rolls = static_cast<int>(std::floor(max_roll / kRollStep + 1e-9));
-    for (int i = -rolls; i <= rolls; ++i) space.rolls.push_back(i * kRollStep);
+    const int rolls = static_cast<int>(std::lround(max_roll / kRollStep));
+    for (int i = -rolls; i <= rolls; ++i) space.rolls.push_back(rolls ? i * max_roll / rolls : 0.0);
     if (local) {
         space.base = initial->R();
         space.max_shift = 0.15;
@@ -75,29 +75,23 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
     return space;
 }
 
-// Some of the frames are enough to choose among candidates.
+// `count` of the pairs, spread over the footage: neighbours look alike.
 WorkingImages some_frames(const WorkingImages& images, std::size_t count) {
-    if (count >= images.references.size()) return images;
-    // Every k-th: neighbours in the footage look alike.
-    WorkingImages out;
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::size_t k = i * images.references.size() / count;
-        out.references.push_back(images.references[k]);
-        out.sources.push_back(images.sources[k]);
-        out.depths.push_back(images.depths[k]);
-    }
-    return out;
+    count = std::min(count, images.size());
+    std::vector<std::size_t> indices;
+    for (std::size_t i = 0; i < count; ++i) indices.push_back(i * images.size() / count);
+    return images.subset(indices);
 }
 
 // What candidates are compared by: edges that agree in direction beyond chance, and over how much
 // of the image. Chance grows as the overlap shrinks.
 double merit(const NecValue& value) { return value.aligned * std::sqrt(value.valid_share); }
 
-// Where the field of view of the reference makes no difference, a common one is assumed (50 deg).
+// Where the field of view of the reference makes little difference, it is the paper's 45 deg.
 double preference(const Rig& rig) {
     const double ratio =
-        std::log(rig.reference.width / rig.reference.fx / (2 * std::tan(25 * kDegree)));
-    return 1 - 0.05 * ratio * ratio;
+        std::log(rig.reference.width / rig.reference.fx / (2 * std::tan(22.5 * kDegree)));
+    return 1 - 0.12 * std::abs(ratio);
 }
 
 struct Candidate {
@@ -129,9 +123,9 @@ InverseDepths inverse_depths(const Level& level) {
 // The same rig moved by `t`, and turned so that the middle of the image at the median depth stays
 // where it is: what the search has found is kept, only the parallax changes.
 Rig with_parallax(const Rig& rig, const Eigen::Vector3d& t, double inverse_depth) {
-    const Eigen::Vector3d seen = rig.R() * Eigen::Vector3d::UnitZ();
-    const Eigen::Quaterniond back =
-        Eigen::Quaterniond::FromTwoVectors(seen + t * inverse_depth, seen);
+    const Eigen::Vector3d axis = rig.R() * Eigen::Vector3d::UnitZ();
+    const Eigen::Quaterniond back = Eigen::Quaterniond::FromTwoVectors(
+        axis + t * inverse_depth, axis + rig.t() * inverse_depth);
     Rig moved = rig;
     moved.source_from_reference.rotation = (back * rig.source_from_reference.rotation).normalized();
     moved.source_from_reference.translation = back * t;
@@ -210,12 +204,14 @@ void place(const Level& level, bool free_focal, const CalibrationOptions& option
         }
         if (free_focal) {
             const Rig from = candidate.rig;
-            constexpr int kFocals = 9;  // horizontal fields of view of 28 to 95 deg
+            constexpr int kFocals = 9;  // horizontal fields of view of 27 to 92 deg
+            const double paper = 0.5 / std::tan(22.5 * kDegree);  // 45 deg, in widths
             choose_best(
                 level, options.num_threads, kFocals,
                 [&](int i) {
-                    const double focal = from.reference.width * 2.0 * std::pow(0.6875, i * 0.5);
-                    return with_reference_focal(from, focal / from.reference.fx);
+                    const double focal = paper * std::pow(1.2, i - 5);
+                    return with_reference_focal(from,
+                                                focal * from.reference.width / from.reference.fx);
                 },
                 candidate);
         }
@@ -264,10 +260,11 @@ std::vector<Step> schedule(int width, int height) {
             steps.push_back({factor, 2});
     return steps;
 }
+
 Start find_start(const WorkingImages& all_images, const ImageView& reference,
                  const ImageView& source, const std::optional<Rig>& initial,
                  const CalibrationOptions& options, const std::function<void(double)>& progress) {
-    constexpr std::size_t kFrames = 16;
+    constexpr std::size_t kFrames = 12;
     const WorkingImages images = some_frames(all_images, kFrames);
     const int num_threads = options.num_threads;
     const double start = seconds_now();
@@ -296,6 +293,10 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
 
     const std::vector<Step> steps =
         schedule(images.references[0].width, images.references[0].height);
+    const bool focal_free =
+        !options.reference_camera && !options.reference_hfov_deg && !options.source_camera;
+    // Placing costs hundreds of evaluations: fewer frames tell enough.
+    const WorkingImages few = some_frames(images, kFrames / 2);
     std::vector<Candidate> candidates;
     for (const SearchCandidate& peak : found) {
         CandidateReport entry;
@@ -307,27 +308,27 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         candidate.rig = peak.rig;
         candidate.entry = out.candidates.size();
         if (initial) candidate.rig.source_from_reference.translation = initial->t();
-        const Level level = make_level(images, steps[0].factor, candidate.rig, num_threads);
-        if (searches && !initial)
-            place(
-                level,
-                !options.reference_camera && !options.reference_hfov_deg && !options.source_camera,
-                options, candidate);
+        const Level level = make_level(few, steps[0].factor, candidate.rig, num_threads);
+        candidate.merit = merit(pooled(level, candidate.rig, num_threads));
+        if (searches && !initial) place(level, focal_free, options, candidate);
         candidate.share_limit = 0.8 * pooled(level, candidate.rig, num_threads).valid_share;
         candidates.push_back(candidate);
         out.candidates.push_back(entry);
     }
     progress(0.5);
 
+    CalibrationOptions quick = options;  // enough to compare by; the winner is solved in full
+    quick.max_iterations = std::min(options.max_iterations, 30);
+
     // Halving: each level costs four times the last, and tells more.
     for (std::size_t s = 0; s + 1 < steps.size() || s == 0; ++s) {
         if (s > 0 && steps[s].factor == 1) break;
         if (s == 0 || steps[s].factor != steps[s - 1].factor)
-            keep_best(candidates, steps[s].factor > 4 ? 8 : steps[s].factor > 2 ? 5 : 2);
+            keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
             candidate.levels.push_back(
-                solve_level(level, steps[s].stage, candidate.share_limit, options, candidate.rig));
+                solve_level(level, steps[s].stage, candidate.share_limit, quick, candidate.rig));
             candidate.merit = merit(pooled(level, candidate.rig, num_threads));
             out.candidates[candidate.entry].refined = candidate.rig;
             out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;

@@ -52,13 +52,9 @@ Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
 }
 
 WorkingImages every_second(const WorkingImages& images, std::size_t first) {
-    WorkingImages out;
-    for (std::size_t i = first; i < images.references.size(); i += 2) {
-        out.references.push_back(images.references[i]);
-        out.sources.push_back(images.sources[i]);
-        out.depths.push_back(images.depths[i]);
-    }
-    return out;
+    std::vector<std::size_t> indices;
+    for (std::size_t i = first; i < images.size(); i += 2) indices.push_back(i);
+    return images.subset(indices);
 }
 
 // Median distance between where two rigs send the pixels of a level, in reference pixels of the
@@ -100,13 +96,15 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
     report.baseline_nec = baseline.mean;
     report.contrast = baseline.deviation > 0 ? (here - baseline.mean) / baseline.deviation : 0.0;
 
-    const std::size_t pairs = images.references.size();
+    const std::size_t pairs = images.size();
     report.repeatability_px = INFINITY;
     if (pairs >= 2) {
+        CalibrationOptions quick = options;  // they start where all frames agree
+        quick.max_iterations = std::min(options.max_iterations, 12);
         Rig halves[2] = {rig, rig};
         for (std::size_t k = 0; k < 2; ++k)
             solve_level(make_level(every_second(images, k), kFactor, rig, options.num_threads), 2,
-                        0.8 * report.valid_share, options, halves[k]);
+                        0.8 * report.valid_share, quick, halves[k]);
         report.repeatability_px = median_distance(level, halves[0], halves[1]);
     }
 

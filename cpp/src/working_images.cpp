@@ -90,11 +90,13 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     const int reduction = (references[0].width + working_width - 1) / working_width;
     const int width = static_cast<int>(std::lround(references[0].width / double(reduction)));
     const int height = static_cast<int>(std::lround(references[0].height / double(reduction)));
+    const std::size_t count = chosen.size();
     WorkingImages images;
-    images.references.resize(chosen.size());
-    images.sources.resize(chosen.size());
-    images.depths.resize(chosen.size());
-    parallel_ranges(static_cast<int>(chosen.size()), num_threads, [&](int begin, int end) {
+    images.references.resize(count);
+    images.sources.resize(count);
+    for (int factor : kFactors)
+        images.pyramid[factor] = {std::vector<Image>(count), std::vector<Image>(count)};
+    parallel_ranges(static_cast<int>(count), num_threads, [&](int begin, int end) {
         for (int i = begin; i < end; ++i) {
             const int frame = chosen[i];
             for_frame("reference", frame, [&] {
@@ -103,25 +105,46 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
             });
             for_frame("source", frame,
                       [&] { images.sources[i] = normalize_percentiles(to_gray(sources[frame])); });
+            Image depth;
             for_frame("depth", frame, [&] {
-                images.depths[i] = resize_depth(clean_depth(depths[frame]), width, height);
-                const auto& d = images.depths[i].pixels;
+                depth = resize_depth(clean_depth(depths[frame]), width, height);
+                const auto& d = depth.pixels;
                 if (std::none_of(d.begin(), d.end(), [](float z) { return z > 0; }))
                     throw std::invalid_argument(
                         "no depth is known, expected finite metres > 0 in some pixels");
             });
+            for (auto& [factor, reduced] : images.pyramid) {
+                const int w = std::max(1, static_cast<int>(std::lround(width / double(factor))));
+                const int h = std::max(1, static_cast<int>(std::lround(height / double(factor))));
+                reduced.references[i] = resize_area(images.references[i], w, h);
+                reduced.depths[i] = resize_depth(depth, w, h);
+                if (factor <= kFinest) reduced.depths[i] = without_depth_edges(reduced.depths[i]);
+            }
         }
     });
     return images;
 }
 
+WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) const {
+    WorkingImages out;
+    for (std::size_t i : indices) {
+        out.references.push_back(references[i]);
+        out.sources.push_back(sources[i]);
+        for (const auto& [factor, reduced] : pyramid) {
+            out.pyramid[factor].references.push_back(reduced.references[i]);
+            out.pyramid[factor].depths.push_back(reduced.depths[i]);
+        }
+    }
+    return out;
+}
+
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads) {
     Level level;
     level.factor = factor;
-    const Image& reference = images.references[0];
+    const ReducedImages& reduced = images.pyramid.at(factor);
     const Image& source = images.sources[0];
-    level.width = std::max(1, static_cast<int>(std::lround(reference.width / double(factor))));
-    level.height = std::max(1, static_cast<int>(std::lround(reference.height / double(factor))));
+    level.width = reduced.references[0].width;
+    level.height = reduced.references[0].height;
     // Source pixels to a reference pixel of this level: more are averaged first (they would
     // alias), fewer mean that the reference is finer than its partner, and is blurred to match.
     const double density = (rig.source.fx / rig.source.width * source.width) /
@@ -136,13 +159,11 @@ Level make_level(const WorkingImages& images, int factor, const Rig& rig, int nu
     level.weights.resize(count);
     parallel_ranges(count, num_threads, [&](int begin, int end) {
         for (int i = begin; i < end; ++i) {
-            const Image depth = resize_depth(images.depths[i], level.width, level.height);
             level.frames[i] = make_nec_frame(
-                gaussian_blur(resize_area(images.references[i], level.width, level.height),
-                              reference_blur),
+                gaussian_blur(reduced.references[i], reference_blur),
                 gaussian_blur(
                     resize_area(images.sources[i], level.source_width, level.source_height), kBlur),
-                factor <= kFinest ? without_depth_edges(depth) : depth, at_level);
+                reduced.depths[i], at_level);
             level.weights[i] = evaluate_nec(level.frames[i], at_level).norm;
         }
     });

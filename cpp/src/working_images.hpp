@@ -1,6 +1,7 @@
 // The caller's frames as the calibration works on them, and their pyramid.
 #pragma once
 
+#include <map>
 #include <vector>
 
 #include "xcalib/calibrate.hpp"
@@ -8,11 +9,22 @@
 
 namespace xcalib {
 
-struct WorkingImages {
-    std::vector<Image> references;  // gray, normalized, reduced by a whole factor
-    std::vector<Image> sources;     // gray, normalized, as large as given
-    std::vector<Image> depths;      // on the reference's grid
+// References and depths at one level of the pyramid: what no rig changes.
+struct ReducedImages {
+    std::vector<Image> references, depths;
 };
+
+struct WorkingImages {
+    std::vector<Image> references;         // gray, normalized, reduced by a whole factor
+    std::vector<Image> sources;            // gray, normalized, as large as given
+    std::map<int, ReducedImages> pyramid;  // by the factor of kFactors
+
+    std::size_t size() const { return references.size(); }
+    // The pairs of these indices.
+    WorkingImages subset(const std::vector<std::size_t>& indices) const;
+};
+
+inline constexpr int kFactors[] = {8, 4, 2, 1};
 
 // Checks what was given, and throws naming the frame by its index in the caller's lists.
 void validate_frames(const std::vector<ImageView>& references,

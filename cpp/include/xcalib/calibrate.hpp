@@ -24,10 +24,10 @@ enum class SearchMode {
 struct SearchOptions {
     SearchMode mode = SearchMode::automatic;
     double max_fov_ratio = 2.5;  // of the tangents, either way, (1, 10]
-    double max_roll_deg = 6.0;   // [deg], >= 0
+    double max_roll_deg = 5.0;   // [deg], >= 0
     double min_overlap = 0.3;    // (0, 1): geometric mean of the shares of both images' edges
     int map_width = 96;          // [px], >= 32
-    int candidates = 16;         // peaks considered, >= 1
+    int candidates = 12;         // peaks considered, >= 1
 };
 
 struct CalibrationOptions {
