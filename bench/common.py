@@ -1,0 +1,43 @@
+"""What the benchmarks share: where the data is, what machine this is, how a mapping is compared."""
+
+import os
+import platform
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def data(name: str) -> Path | None:
+    """The folder of a data set, by XCALIB_DATA or ../shared/data; None, said, where absent."""
+    base = Path(os.environ.get("XCALIB_DATA", ROOT.parent / "shared" / "data"))
+    folder = base / name
+    if folder.is_dir():
+        return folder
+    print(f"skipped: {name} is not in {base} (set XCALIB_DATA)")
+    return None
+
+
+def machine() -> str:
+    """Processor, cores, compiler-independent commit: what a figure must be printed with."""
+    cpu = platform.machine()
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("model name"):
+            cpu = line.split(":", 1)[1].strip()
+            break
+    commit = subprocess.run(
+        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True
+    ).stdout.strip()
+    return f"{cpu}, {os.cpu_count()} cores, commit {commit or 'unknown'}"
+
+
+def median_error(found, truth, depths) -> float:
+    """Median end-point error [source px] over all frames."""
+    from xcalib import synthetic
+
+    errors = np.concatenate(
+        [synthetic.end_point_error(found, truth, depth).ravel() for depth in depths]
+    )
+    return float(np.nanmedian(errors))

@@ -1,0 +1,34 @@
+"""Two pairs of another rig: false-colour thermal, another field of view, plane prior, no guess."""
+
+import cv2
+import numpy as np
+from common import data, machine
+
+import xcalib
+from xcalib.depth import PlaneDepth
+
+
+def main() -> None:
+    print(machine())
+    folder = data("flir_adas")
+    if folder is None:
+        return
+    references = [cv2.imread(str(p)) for p in sorted(folder.glob("*_Z.JPG"))]
+    sources = [cv2.imread(str(p)) for p in sorted(folder.glob("*_T.JPG"))]
+    plane = PlaneDepth()
+    depths = [plane(i, image) for i, image in enumerate(references)]
+    result = xcalib.calibrate(references, sources, depths)
+    print(result.report.brief())
+    height, width = references[0].shape[:2]
+    scaled = result.rig.resized(640, round(height * 640 / width), 640, 512)
+    grid = xcalib.Registrar(scaled).map(depths[0])
+    y, x = np.mgrid[0 : grid.shape[0], 0:640]
+    ok = np.isfinite(grid[..., 0])
+    distance = np.abs(grid[..., 0] - (x - 52) / 0.889)[ok]
+    slope = np.polyfit(y[ok], grid[..., 1][ok], 1)[0]
+    print(f"|x_S - (x - 52) / 0.889|: median {np.median(distance):.1f} px of 640")
+    print(f"vertical scale {slope:.3f} (similarity: {1 / 0.889:.3f})")
+
+
+if __name__ == "__main__":
+    main()

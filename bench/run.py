@@ -1,0 +1,9 @@
+"""Every benchmark, one after the other. Each prints the machine, the commit and its figures."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+for name in ("register_frame", "night_rig", "flir_rig", "synthetic_rigs"):
+    print(f"== {name}", flush=True)
+    subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)
