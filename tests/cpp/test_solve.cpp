@@ -17,6 +17,7 @@ constexpr int kWidth = 200, kHeight = 150;
 struct Scene {
     Rig truth;
     WorkingImages images;
+    std::vector<Image> depths;
 };
 
 // Three pairs of a rig with the source's contrast reversed, depth exact.
@@ -35,7 +36,14 @@ Scene make_scene(unsigned seed) {
         scene.images.references.push_back(drawn(texture, kWidth, kHeight));
         scene.images.sources.push_back(source_view(
             scene.truth, [&](double x, double y) { return 1 - texture(x, y); }, depth));
-        scene.images.depths.push_back(drawn(depth, kWidth, kHeight));
+        scene.depths.push_back(drawn(depth, kWidth, kHeight));
+        for (int factor : kFactors) {
+            const int width = static_cast<int>(std::lround(kWidth / double(factor)));
+            const int height = static_cast<int>(std::lround(kHeight / double(factor)));
+            ReducedImages& reduced = scene.images.pyramid[factor];
+            reduced.references.push_back(resize_area(scene.images.references[i], width, height));
+            reduced.depths.push_back(resize_depth(scene.depths[i], width, height));
+        }
     }
     return scene;
 }
@@ -56,7 +64,7 @@ Rig perturbed(const Rig& truth) {
 double end_point_error(const Scene& scene, const Rig& rig) {
     double sum = 0;
     int count = 0;
-    for (const Image& depth : scene.images.depths)
+    for (const Image& depth : scene.depths)
         for (int y = 0; y < depth.height; ++y)
             for (int x = 0; x < depth.width; ++x) {
                 const double z = depth.row(y)[x];
