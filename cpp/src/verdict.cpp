@@ -89,7 +89,7 @@ std::string format(const char* pattern, Values... values) {
 
 void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
            CalibrationReport& report) {
-    constexpr double kContrast = 6.0, kRepeatability = 1.0, kShare = 0.05;
+    constexpr double kDetail = 0.9, kContrast = 6.0, kRepeatability = 1.0, kShare = 0.05;
     const Level level = make_level(images, kFactor, rig, options.num_threads);
     const double here = pooled(level, rig, options.num_threads).nec;
     const Baseline baseline = displaced(level, rig, options.num_threads);
@@ -108,6 +108,12 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
         report.repeatability_px = median_distance(level, halves[0], halves[1]);
     }
 
+    // Where the fit is some pixels off, coarse edges still meet and fine ones do not.
+    const LevelReport& finest = report.levels.back();
+    const auto coarse = std::find_if(report.levels.rbegin(), report.levels.rend(),
+                                     [](const LevelReport& l) { return l.factor >= 4; });
+    const double coarse_nec = coarse == report.levels.rend() ? finest.nec : coarse->nec;
+
     report.converged = false;
     if (pairs < 2) report.message = "1 image pair is too few to trust, expected at least 2";
     else if (report.valid_share < kShare)
@@ -120,6 +126,11 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
             "edges agree hardly better than displaced ones: NEC stands out by "
             "%.1f deviations, expected at least %.0f",
             report.contrast, kContrast);
+    else if (finest.nec < kDetail * coarse_nec)
+        report.message = format(
+            "only coarse edges agree: NEC falls from %.3f at 1/%d of the size to %.3f, expected at "
+            "least %.3f",
+            coarse_nec, coarse->factor, finest.nec, kDetail * coarse_nec);
     else if (report.repeatability_px > kRepeatability)
         report.message = format(
             "two halves of the frames disagree by %.2f px, expected at most "
