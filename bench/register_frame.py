@@ -17,7 +17,14 @@ def main() -> None:
     rig = xcalib.Rig(reference, xcalib.Pinhole.from_hfov(640, 512, 48), t=[-0.13, 0.01, 0.02])
     registrar = xcalib.Registrar(rig, num_threads=1)
     source = rng.random((512, 640), dtype=np.float32)
-    depths = [rng.uniform(3, 60, (960, 1280)).astype(np.float32) for _ in range(4)]
+    # A road, another height each frame: like real depth it is smooth, which caches like.
+    row = np.arange(960, dtype=np.float32)[:, None] - 400
+    depths = [
+        np.broadcast_to(np.where(row > 0, height * 1370 / np.maximum(row, 1), 80), (960, 1280))
+        .clip(0, 80)
+        .astype(np.float32)
+        for height in (1.4, 1.5, 1.6, 1.7)
+    ]
     y, x = np.mgrid[0:960, 0:1280].astype(np.float32)
     h = rig.infinite_homography.astype(np.float32)
     k = (rig.source.K @ rig.t).astype(np.float32)

@@ -67,6 +67,11 @@ RowSampler row_sampler(PixelType type, int channels) {
     throw std::invalid_argument("unknown pixel type");
 }
 
+const float* depth_row(const ImageView& depth, int y) {
+    return reinterpret_cast<const float*>(static_cast<const char*>(depth.data) +
+                                          y * depth.row_bytes);
+}
+
 void require_size(const char* name, int width, int height, const Pinhole& camera) {
     if (width == camera.width && height == camera.height) return;
     std::ostringstream message;
@@ -86,19 +91,25 @@ Registrar::Registrar(const Rig& rig, int num_threads)
         throw std::invalid_argument("source is narrower than 2 px, too small to interpolate");
 }
 
-Image Registrar::on_reference_grid(const ImageView& depth) const {
-    require_same_aspect("depth", depth.width, depth.height, rig_.reference.width,
-                        rig_.reference.height);
-    return resize_depth(clean_depth(depth), rig_.reference.width, rig_.reference.height);
+ImageView Registrar::on_reference_grid(const ImageView& depth, Image& room) const {
+    const Pinhole& grid = rig_.reference;
+    require_same_aspect("depth", depth.width, depth.height, grid.width, grid.height);
+    if (depth.type != PixelType::f32 || depth.channels != 1)
+        throw std::invalid_argument("depth must be one float32 channel in metres");
+    if (depth.width == grid.width && depth.height == grid.height) return depth;
+    room = resize_depth(clean_depth(depth), grid.width, grid.height);
+    return room.view();
 }
 
 void Registrar::map(const ImageView& depth, float* out) const {
-    const Image grid = on_reference_grid(depth);
+    Image room;
+    const ImageView grid = on_reference_grid(depth, room);
     parallel_ranges(grid.height, num_threads_, [&](int begin, int end) {
         std::vector<float> u(grid.width), v(grid.width);
         std::vector<std::uint8_t> validity(grid.width);
         for (int y = begin; y < end; ++y) {
-            map_row(reprojection_, grid.row(y), y, grid.width, u.data(), v.data(), validity.data());
+            map_row(reprojection_, depth_row(grid, y), y, grid.width, u.data(), v.data(),
+                    validity.data());
             float* row = out + 2 * static_cast<std::size_t>(y) * grid.width;
             for (int x = 0; x < grid.width; ++x) {
                 row[2 * x] = u[x];
@@ -114,13 +125,14 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
     require_size("registered", registered.width, registered.height, rig_.reference);
     if (registered.type != source.type || registered.channels != source.channels)
         throw std::invalid_argument("registered must have the source's pixel type and channels");
-    const Image grid = on_reference_grid(depth);
+    Image room;
+    const ImageView grid = on_reference_grid(depth, room);
     const RowSampler sample = row_sampler(source.type, source.channels);
     parallel_ranges(grid.height, num_threads_, [&](int begin, int end) {
         std::vector<float> u(grid.width), v(grid.width);
         for (int y = begin; y < end; ++y) {
             std::uint8_t* validity = mask + static_cast<std::size_t>(y) * grid.width;
-            map_row(reprojection_, grid.row(y), y, grid.width, u.data(), v.data(), validity);
+            map_row(reprojection_, depth_row(grid, y), y, grid.width, u.data(), v.data(), validity);
             sample(source, u.data(), v.data(), validity, grid.width,
                    static_cast<char*>(registered.data) + y * registered.row_bytes);
         }

@@ -28,7 +28,8 @@ class Registrar {
                         const MutableImageView& registered, std::uint8_t* mask) const;
 
    private:
-    Image on_reference_grid(const ImageView& depth) const;
+    // The depth on the reference's grid: as given where it has that size, else resized into `room`.
+    ImageView on_reference_grid(const ImageView& depth, Image& room) const;
 
     Rig rig_;
     Reprojection reprojection_;
