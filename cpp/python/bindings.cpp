@@ -125,9 +125,8 @@ Compared compared(const py::object& reference, const py::object& registered,
     return out;
 }
 
-double range_of(const py::object& object, const py::object& data_range) {
-    // Integers reach [0, 1] in gray images; float32 images are taken to lie there.
-    (void)object;
+// Gray images of integers lie in [0, 1], and float32 images are taken to.
+double range_of(const py::object& data_range) {
     if (data_range.is_none()) return 1.0;
     const double value = data_range.cast<double>();
     if (!(value > 0))
@@ -556,7 +555,7 @@ only, as the authors' code) or "printed" (Eq. (gradient_clamping) as printed).)"
             [function](const py::object& a, const py::object& b, const py::object& mask,
                        const py::object& data_range) {
                 const Compared c = compared(a, b, mask);
-                const double range = range_of(a, data_range);
+                const double range = range_of(data_range);
                 const py::gil_scoped_release unlocked;
                 return function(c.reference, c.registered, c.valid, range);
             },
