@@ -300,7 +300,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     std::vector<Candidate> candidates;
     for (const SearchCandidate& peak : found) {
         CandidateReport entry;
-        entry.found = peak.rig;
+        entry.found = entry.refined = peak.rig;  // until it is refined, if it is
         entry.score = peak.score;
         entry.correlation = peak.correlation;
         entry.overlap = peak.overlap;
