@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Warnings are errors in CI only.
 WERROR := $(if $(CI),ON,OFF)
 
-BUILD_PACKAGES := cmake g++ libceres-dev libeigen3-dev libopencv-dev libyaml-cpp-dev make \
+BUILD_PACKAGES := cmake g++ libceres-dev libeigen3-dev libhwy-dev libopencv-dev libyaml-cpp-dev make \
     ninja-build python3-dev python3-venv
 TEST_PACKAGES := clang-format libgtest-dev
 

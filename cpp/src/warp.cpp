@@ -1,9 +1,7 @@
 #include "xcalib/warp.hpp"
 
-#include <algorithm>
-#include <limits>
-
 #include "bilinear.hpp"
+#include "map_row.hpp"
 
 namespace xcalib {
 
@@ -13,37 +11,7 @@ Reprojection::Reprojection(const Rig& rig)
 
 void map_row(const Reprojection& reprojection, const float* depth, int y, int width, float* u,
              float* v, std::uint8_t* validity) {
-    // Incremental in x would drift over a row in float: the row's constant is taken in double and
-    // x * step stays below one rounding of a source coordinate.
-    const Eigen::Vector3d start = reprojection.h * Eigen::Vector3d(0, y, 1);
-    const float ax = static_cast<float>(reprojection.h(0, 0)), bx = static_cast<float>(start.x());
-    const float ay = static_cast<float>(reprojection.h(1, 0)), by = static_cast<float>(start.y());
-    const float az = static_cast<float>(reprojection.h(2, 0)), bz = static_cast<float>(start.z());
-    const float kx = static_cast<float>(reprojection.k.x());
-    const float ky = static_cast<float>(reprojection.k.y());
-    const float kz = static_cast<float>(reprojection.k.z());
-    const float right = static_cast<float>(reprojection.source_width - 1);
-    const float bottom = static_cast<float>(reprojection.source_height - 1);
-    constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-    constexpr float kMaxDepth = std::numeric_limits<float>::max();
-    for (int x = 0; x < width; ++x) {
-        const float fx = static_cast<float>(x), d = depth[x];
-        const float z = d * (az * fx + bz) + kz;
-        const float inverse = 1.0f / z;
-        const float su = (d * (ax * fx + bx) + kx) * inverse;
-        const float sv = (d * (ay * fx + by) + ky) * inverse;
-        const bool has_depth = d > 0.0f && d <= kMaxDepth;  // false for NaN and inf
-        // A pixel on the rim stays there whatever the last bit of a rounding says.
-        constexpr float kRim = 1e-3f;
-        const bool inside = (z > static_cast<float>(kNearestZ)) & (su >= -kRim) &
-                            (su <= right + kRim) & (sv >= -kRim) & (sv <= bottom + kRim);
-        const bool ok = has_depth & inside;
-        u[x] = ok ? std::min(std::max(su, 0.0f), right) : kNaN;
-        v[x] = ok ? std::min(std::max(sv, 0.0f), bottom) : kNaN;
-        validity[x] = static_cast<std::uint8_t>(!has_depth ? Validity::no_depth
-                                                : inside   ? Validity::valid
-                                                           : Validity::outside);
-    }
+    map_row_inline(reprojection, depth, y, width, u, v, validity);
 }
 
 Eigen::Matrix<double, 2, kNumParameters> warp_jacobian(const Rig& rig, double x, double y,

@@ -230,7 +230,8 @@ TEST(NecCost, TheCostWithDerivativesIsTheCostWithout) {
         double with = 0;
         std::vector<double> gradient;
         ASSERT_TRUE(pair.problem.Evaluate({}, &with, nullptr, &gradient, nullptr));
-        EXPECT_NEAR(with, pair.cost(), 1e-5 * pair.cost())
+        // 1 - NEC of sums of floats: what it loses as it nears 0 is a rounding of 1.
+        EXPECT_NEAR(with, pair.cost(), 1e-5 * pair.cost() + 1e-9)
             << "at " << off << " of the displacement";
     }
 }

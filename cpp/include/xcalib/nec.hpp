@@ -69,7 +69,8 @@ struct NecNormalEquations {
 // `count`: kNumWithoutReference, or kNumParameters to have the reference camera's too.
 NecNormalEquations nec_normal_equations(const NecFrame& frame, const Rig& rig, int count);
 
-// The rows themselves, for tests and small images only: r (2 per valid pixel) and J.
+// The rows themselves, for tests and small images only: r and J, two rows for each pixel where both
+// images are sampled and the source has an edge, and one row for all that is left of the reference's.
 struct NecRows {
     Eigen::VectorXd residuals;
     Eigen::MatrixXd jacobian;
