@@ -135,22 +135,28 @@ NecValue evaluate_nec(const NecFrame& frame, const Rig& rig) {
     return value_from_sums(frame, sums.aa, sums.vv, sums.av, sums.magnitudes);
 }
 
+NecNormalEquations equations_from_gram(const Eigen::MatrixXd& gram, const NecValue& value) {
+    const Eigen::Index count = gram.rows() - 2;
+    NecNormalEquations out;
+    out.value = value;
+    out.hessian = Eigen::MatrixXd::Zero(count, count);
+    out.gradient = Eigen::VectorXd::Zero(count);
+    if (value.norm <= 0) return out;
+    // V = v / ||v||, dV = (dv - V (V . dv)) / ||v||: a rank-one correction of the plain sums.
+    const double vv = gram(count, count), av = gram(count + 1, count);
+    const Eigen::VectorXd v_dv = gram.block(count, 0, 1, count).transpose();
+    const Eigen::VectorXd a_dv = gram.block(count + 1, 0, 1, count).transpose();
+    out.hessian = (gram.topLeftCorner(count, count) - v_dv * v_dv.transpose() / vv) / vv;
+    out.gradient = -(a_dv - v_dv * (av / vv)) / value.norm;
+    return out;
+}
+
 NecNormalEquations nec_normal_equations(const NecFrame& frame, const Rig& rig, int count) {
     count = count <= kNumWithoutReference ? int{kNumWithoutReference} : int{kNumParameters};
     const NecGram sums = nec_gram(frame, rig, count);
     const Eigen::MatrixXd gram = sums.gram.selfadjointView<Eigen::Lower>();
-    const double vv = gram(count, count), av = gram(count + 1, count);
-    NecNormalEquations out;
-    out.value = value_from_sums(frame, sums.aa, vv, av, sums.magnitudes);
-    out.hessian = Eigen::MatrixXd::Zero(count, count);
-    out.gradient = Eigen::VectorXd::Zero(count);
-    if (out.value.norm <= 0) return out;
-    // V = v / ||v||, dV = (dv - V (V . dv)) / ||v||: a rank-one correction of the plain sums.
-    const Eigen::VectorXd v_dv = gram.block(count, 0, 1, count).transpose();
-    const Eigen::VectorXd a_dv = gram.block(count + 1, 0, 1, count).transpose();
-    out.hessian = (gram.topLeftCorner(count, count) - v_dv * v_dv.transpose() / vv) / vv;
-    out.gradient = -(a_dv - v_dv * (av / vv)) / out.value.norm;
-    return out;
+    return equations_from_gram(gram, value_from_sums(frame, sums.aa, gram(count, count),
+                                                     gram(count + 1, count), sums.magnitudes));
 }
 
 NecRows nec_rows(const NecFrame& frame, const Rig& rig, int count) {

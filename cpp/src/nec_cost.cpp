@@ -43,9 +43,9 @@ CompressedBlock compress(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& 
     return block;
 }
 
-NecCost::NecCost(const NecFrame& frame, int source_width, int source_height, double weight,
+NecCost::NecCost(const ImagePair& pair, int source_width, int source_height, double weight,
                  double minimum_share, bool with_reference)
-    : frame_(frame), source_width_(source_width), source_height_(source_height), weight_(weight),
+    : pair_(pair), source_width_(source_width), source_height_(source_height), weight_(weight),
       minimum_share_(minimum_share), with_reference_(with_reference) {
     for (const Block& block : kBlocks) mutable_parameter_block_sizes()->push_back(block.ambient);
     set_num_residuals((with_reference ? kNumParameters : kNumWithoutReference) + 1);
@@ -61,8 +61,8 @@ bool NecCost::Evaluate(double const* const* parameters, double* residuals,
     SolverParameters p;
     const std::vector<double*> targets = blocks(p);
     for (int b = 0; b < kNumBlocks; ++b) std::copy_n(parameters[b], kBlocks[b].ambient, targets[b]);
-    const Rig rig =
-        rig_from_solver(p, frame_.depth.width, frame_.depth.height, source_width_, source_height_);
+    const Rig rig = rig_from_solver(p, pair_.depth().width, pair_.depth().height, source_width_,
+                                    source_height_);
     const auto cost_of = [this](const NecValue& value) {
         constexpr double kChargeForOverlap = 10.0;
         const double missing = std::max(0.0, minimum_share_ - value.valid_share);
@@ -71,11 +71,11 @@ bool NecCost::Evaluate(double const* const* parameters, double* residuals,
     const int count = num_residuals() - 1;
     if (!jacobians) {
         std::fill_n(residuals, count, 0.0);
-        residuals[count] = std::sqrt(2 * cost_of(evaluate_nec(frame_, rig)));
+        residuals[count] = std::sqrt(2 * cost_of(pair_.evaluate(rig)));
         return true;
     }
     const NecNormalEquations equations =
-        nec_normal_equations(frame_, rig, with_reference_ ? kNumParameters : kNumWithoutReference);
+        pair_.normal_equations(rig, with_reference_ ? kNumParameters : kNumWithoutReference);
     // With any amplitude k, r = A / sqrt(k) - s sqrt(k) B has the same cost up to a constant and
     // the same gradient, and k J^T J for a Hessian. Only edges that have a partner bend the cost,
     // so the k that predicts it is their share, not 1: about half of what direction alone shows to

@@ -3,8 +3,8 @@
 
 #include <ceres/ceres.h>
 
+#include "image_pair.hpp"
 #include "xcalib/camera.hpp"
-#include "xcalib/nec.hpp"
 
 namespace xcalib {
 
@@ -18,11 +18,11 @@ struct CompressedBlock {
 CompressedBlock compress(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& gradient,
                          double cost);
 
-// weight (1 - NEC) of one image pair as a Ceres residual block. A pair whose valid share falls
-// below `minimum_share` is charged for it, so that no fit wins by shrinking the overlap.
+// weight (1 - agreement) of one image pair as a Ceres residual block. A pair whose valid share
+// falls below `minimum_share` is charged for it, so that no fit wins by shrinking the overlap.
 class NecCost : public ceres::CostFunction {
    public:
-    NecCost(const NecFrame& frame, int source_width, int source_height, double weight,
+    NecCost(const ImagePair& pair, int source_width, int source_height, double weight,
             double minimum_share, bool with_reference);
 
     bool Evaluate(double const* const* parameters, double* residuals,
@@ -32,7 +32,7 @@ class NecCost : public ceres::CostFunction {
     static std::vector<double*> blocks(SolverParameters& parameters);
 
    private:
-    const NecFrame& frame_;
+    const ImagePair& pair_;
     int source_width_, source_height_;
     double weight_, minimum_share_;
     bool with_reference_;

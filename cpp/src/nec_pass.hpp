@@ -30,4 +30,8 @@ struct NecGram {
 // Where `rows` is given it receives the rows too, as its columns.
 NecGram nec_gram(const NecFrame& frame, const Rig& rig, int count, Eigen::MatrixXd* rows = nullptr);
 
+// The normal equations of 1 - A . V, A = a / ||a|| and V = v / ||v||, from the Gram matrix (all of
+// it) of the columns [dv/dp ..., v, a].
+NecNormalEquations equations_from_gram(const Eigen::MatrixXd& gram, const NecValue& value);
+
 }  // namespace xcalib

@@ -6,9 +6,7 @@
 #include <mutex>
 #include <opencv2/core.hpp>
 
-#include "bilinear.hpp"
 #include "parallel.hpp"
-#include "xcalib/nec.hpp"
 
 namespace xcalib {
 namespace {
@@ -41,14 +39,11 @@ DirectionMap map_for(const Pinhole& camera, double step) {
     return map;
 }
 
-// An image drawn on a map, as edges: z = a exp(2 i theta), of unit energy over the map.
-struct MapEdges {
-    std::vector<Complex> doubled;
-    std::vector<float> mask;
-};
-
-struct MapSampler {  // where each map pixel looks in the image; negative: outside
+// Where each map pixel looks in the image (negative: outside), and exp(-2 i phi) for the angle phi
+// by which the image shows the map's directions turned.
+struct MapSampler {
     std::vector<float> u, v;
+    std::vector<Complex> turn;
 };
 
 MapSampler map_sampler(const DirectionMap& map, const Pinhole& camera,
@@ -57,6 +52,7 @@ MapSampler map_sampler(const DirectionMap& map, const Pinhole& camera,
     const std::size_t size = static_cast<std::size_t>(map.width) * map.height;
     sampler.u.assign(size, -1.0f);
     sampler.v.assign(size, -1.0f);
+    sampler.turn.resize(size);
     for (int y = 0; y < map.height; ++y)
         for (int x = 0; x < map.width; ++x) {
             const Eigen::Vector3d ray = camera_from_map * map.ray(x, y);
@@ -68,38 +64,26 @@ MapSampler map_sampler(const DirectionMap& map, const Pinhole& camera,
             const std::size_t i = static_cast<std::size_t>(y) * map.width + x;
             sampler.u[i] = static_cast<float>(p.x());
             sampler.v[i] = static_cast<float>(p.y());
+            const Eigen::Vector2d beside = project(camera, camera_from_map * map.ray(x + 1, y)) - p;
+            const Complex direction(static_cast<float>(beside.x() / beside.norm()),
+                                    static_cast<float>(-beside.y() / beside.norm()));
+            sampler.turn[i] = product(direction, direction);
         }
     return sampler;
 }
 
-MapEdges draw(const Image& image, const MapSampler& sampler, const DirectionMap& map) {
-    Image drawn(map.width, map.height);
-    std::vector<std::uint8_t> outside(drawn.pixels.size());
-    for (std::size_t i = 0; i < drawn.pixels.size(); ++i) {
-        outside[i] = sampler.u[i] < 0;
-        if (!outside[i]) drawn.pixels[i] = bilinear(image, sampler.u[i], sampler.v[i]).value;
-    }
-    const EdgeField field = edge_field(drawn, mean_gradient(drawn, outside.data()));
-    MapEdges edges;
-    edges.doubled.assign(drawn.pixels.size(), Complex(0));
-    edges.mask.assign(drawn.pixels.size(), 0.0f);
+// Edges drawn on a map, of unit energy over it: each frame has one say.
+std::vector<Complex> draw(const EdgeMap& edges, const MapSampler& sampler) {
+    std::vector<Complex> drawn(sampler.u.size());
     double energy = 0;
-    for (int y = 1; y + 1 < map.height; ++y)
-        for (int x = 1; x + 1 < map.width; ++x) {
-            const std::size_t i = static_cast<std::size_t>(y) * map.width + x;
-            if (outside[i - map.width] | outside[i - 1] | outside[i] | outside[i + 1] |
-                outside[i + map.width])
-                continue;  // the rim of a map is not an edge
-            edges.mask[i] = 1.0f;
-            const float vx = field.x[i], vy = field.y[i];
-            const float a = std::sqrt(vx * vx + vy * vy);
-            if (a <= 0) continue;
-            edges.doubled[i] = Complex((vx * vx - vy * vy) / a, 2 * vx * vy / a);
-            energy += a * a;
-        }
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+        if (sampler.u[i] < 0) continue;
+        drawn[i] = product(sample(edges, sampler.u[i], sampler.v[i]).value, sampler.turn[i]);
+        energy += std::norm(drawn[i]);
+    }
     const float scale = energy > 0 ? static_cast<float>(1 / std::sqrt(energy)) : 0.0f;
-    for (Complex& z : edges.doubled) z *= scale;  // each frame has one say
-    return edges;
+    for (Complex& z : drawn) z *= scale;
+    return drawn;
 }
 
 using Spectrum = cv::Mat;  // CV_32FC2
@@ -124,18 +108,18 @@ struct CameraSpectra {
     double total_energy = 0;
 };
 
-CameraSpectra camera_spectra(const std::vector<Image>& images, const DirectionMap& map,
+CameraSpectra camera_spectra(const std::vector<EdgeMap>& images, const DirectionMap& map,
                              const Pinhole& camera, const Eigen::Matrix3d& camera_from_map,
                              cv::Size size) {
     CameraSpectra out;
     const MapSampler sampler = map_sampler(map, camera, camera_from_map);
-    std::vector<float> energy(sampler.u.size(), 0.0f), mask;
-    for (const Image& image : images) {
-        MapEdges edges = draw(image, sampler, map);
-        for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += std::norm(edges.doubled[i]);
-        out.frames.push_back(spectrum_of(edges.doubled.data(), map, size));
-        mask = std::move(edges.mask);
+    std::vector<float> energy(sampler.u.size(), 0.0f), mask(sampler.u.size());
+    for (const EdgeMap& image : images) {
+        const std::vector<Complex> drawn = draw(image, sampler);
+        for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += std::norm(drawn[i]);
+        out.frames.push_back(spectrum_of(drawn.data(), map, size));
     }
+    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = sampler.u[i] >= 0;
     for (float e : energy) out.total_energy += e;
     out.energy = spectrum_of(energy, map, size);
     out.mask = spectrum_of(mask, map, size);
@@ -256,16 +240,11 @@ std::vector<Peak> peaks_of(const CameraSpectra& reference, const CameraSpectra& 
     return peaks;
 }
 
-Image reduced_for(const Image& image, double factor) {
-    if (factor <= 1) return gaussian_blur(image, 0.8);
-    const int width = std::max(8, static_cast<int>(std::lround(image.width / factor)));
-    const int height = std::max(8, static_cast<int>(std::lround(image.height / factor)));
-    return gaussian_blur(resize_area(image, width, height), 0.8);
-}
-
-std::vector<Image> reduced_for(const std::vector<Image>& images, double factor) {
-    std::vector<Image> out;
-    for (const Image& image : images) out.push_back(reduced_for(image, factor));
+std::vector<EdgeMap> reduced_for(const std::vector<EdgeMap>& maps, double factor) {
+    std::vector<EdgeMap> out;
+    for (const EdgeMap& map : maps)
+        out.push_back(reduced(map, std::max(8, static_cast<int>(std::lround(map.width / factor))),
+                              std::max(8, static_cast<int>(std::lround(map.height / factor)))));
     return out;
 }
 
@@ -283,17 +262,18 @@ double distance(const Rig& a, const Rig& b) {
 
 }  // namespace
 
-std::vector<SearchCandidate> global_search(const std::vector<Image>& references,
-                                           const std::vector<Image>& sources,
+std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& references,
+                                           const std::vector<EdgeMap>& sources,
                                            const SearchSpace& space, int num_threads) {
     std::vector<Peak> all;
     std::vector<double> steps;
     std::mutex mutex;
-    const std::vector<Image> reduced =
+    const std::vector<EdgeMap> reference_maps =
         reduced_for(references, static_cast<double>(references[0].width) / space.map_width);
     for (std::size_t r = 0; r < space.hypotheses.size(); ++r) {
         const SearchHypothesis& hypothesis = space.hypotheses[r];
-        const Pinhole camera = hypothesis.reference.resized(reduced[0].width, reduced[0].height);
+        const Pinhole camera =
+            hypothesis.reference.resized(reference_maps[0].width, reference_maps[0].height);
         const double step = 1 / camera.fx;
         steps.push_back(step);
         const DirectionMap map = map_for(camera, step);
@@ -318,13 +298,13 @@ std::vector<SearchCandidate> global_search(const std::vector<Image>& references,
         std::vector<CameraSpectra> reference_spectra(distinct.size());
         parallel_ranges(static_cast<int>(distinct.size()), num_threads, [&](int begin, int end) {
             for (int i = begin; i < end; ++i)
-                reference_spectra[i] =
-                    camera_spectra(reduced, map, camera, Eigen::Matrix3d::Identity(), distinct[i]);
+                reference_spectra[i] = camera_spectra(reference_maps, map, camera,
+                                                      Eigen::Matrix3d::Identity(), distinct[i]);
         });
         parallel_each(static_cast<int>(hypothesis.sources.size()), num_threads, [&](int s) {
             // One source pixel a map pixel: finer would alias.
             const Pinhole& source = hypothesis.sources[s];
-            const std::vector<Image> source_reduced =
+            const std::vector<EdgeMap> source_reduced =
                 reduced_for(sources, source.fx / source.width * sources[0].width * step);
             const Pinhole source_camera =
                 source.resized(source_reduced[0].width, source_reduced[0].height);

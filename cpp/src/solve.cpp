@@ -80,9 +80,9 @@ double seconds_now() {
 
 NecValue pooled(const Level& level, const Rig& rig, int num_threads) {
     const Rig at_level = level.rig_at(rig);
-    std::vector<NecValue> values(level.frames.size());
+    std::vector<NecValue> values(level.pairs.size());
     parallel_ranges(static_cast<int>(values.size()), num_threads, [&](int begin, int end) {
-        for (int i = begin; i < end; ++i) values[i] = evaluate_nec(level.frames[i], at_level);
+        for (int i = begin; i < end; ++i) values[i] = level.pairs[i]->evaluate(at_level);
     });
     NecValue sum;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -100,9 +100,9 @@ LevelReport solve_level(const Level& level, int stage, double share_limit,
     SolverParameters p = solver_from_rig(rig);
     const SolverParameters held = p;
     ceres::Problem problem;
-    for (std::size_t i = 0; i < level.frames.size(); ++i)
+    for (std::size_t i = 0; i < level.pairs.size(); ++i)
         problem.AddResidualBlock(
-            new NecCost(level.frames[i], level.source_width, level.source_height, level.weights[i],
+            new NecCost(*level.pairs[i], level.source_width, level.source_height, level.weights[i],
                         share_limit, options.optimize_reference),
             nullptr, NecCost::blocks(p));
     if (stage == 1 && options.prior_weight > 0) {

@@ -83,8 +83,8 @@ WorkingImages some_frames(const WorkingImages& images, std::size_t count) {
     return images.subset(indices);
 }
 
-// What candidates are compared by: edges that agree in direction beyond chance, and over how much
-// of the image. Chance grows as the overlap shrinks.
+// What candidates are compared by: how well edges agree beyond chance, and over how much of the
+// image. Chance grows as the overlap shrinks.
 double merit(const NecValue& value) { return value.aligned * std::sqrt(value.valid_share); }
 
 // Where the field of view of the reference makes little difference, it is the paper's 45 deg.
@@ -107,13 +107,17 @@ struct InverseDepths {
     double low, median, high;
 };
 
-InverseDepths inverse_depths(const Level& level) {
+InverseDepths inverse_depths(const ReducedImages& images) {
     std::vector<double> values;
-    for (const NecFrame& frame : level.frames)
-        for (std::size_t i = 0; i < frame.depth.pixels.size(); ++i)
-            if (frame.depth.pixels[i] > 0 &&
-                (frame.reference.x[i] != 0 || frame.reference.y[i] != 0))
-                values.push_back(1.0 / frame.depth.pixels[i]);
+    for (std::size_t k = 0; k < images.depths.size(); ++k) {
+        const std::vector<float>& depth = images.depths[k].pixels;
+        double mean = 0;
+        for (const auto& z : images.edges[k].z) mean += std::norm(z);
+        mean /= static_cast<double>(depth.size());
+        for (std::size_t i = 0; i < depth.size(); ++i)
+            if (depth[i] > 0 && std::norm(images.edges[k].z[i]) > mean)
+                values.push_back(1.0 / depth[i]);
+    }
     if (values.empty()) return {0.0, 0.0, 0.0};
     std::sort(values.begin(), values.end());
     const auto at = [&](double share) { return values[std::size_t(share * (values.size() - 1))]; };
@@ -180,9 +184,8 @@ void choose_best(const Level& level, int num_threads, int count, const Variant& 
 // The search sees one displacement for all depths, at coarse steps of scale and roll. This looks
 // for the baseline that goes with it, and for what the search has rounded, on grids in turn whose
 // steps are about a pixel of the level.
-void place(const Level& level, bool free_focal, const CalibrationOptions& options,
-           Candidate& candidate) {
-    const InverseDepths inverse = inverse_depths(level);
+void place(const Level& level, const InverseDepths& inverse, bool free_focal,
+           const CalibrationOptions& options, Candidate& candidate) {
     const double f = level.rig_at(candidate.rig).source.fx;
     const double half = 0.5 * level.width * f / level.rig_at(candidate.rig).reference.fx;
     candidate.merit =
@@ -273,7 +276,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     std::vector<SearchCandidate> found;
     const bool searches = options.search.mode != SearchMode::off;
     if (searches) {
-        found = global_search(images.references, images.sources,
+        found = global_search(images.reference_edges, images.source_edges,
                               search_space(reference, source, initial, options), num_threads);
     } else {
         SearchCandidate given;
@@ -297,6 +300,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         !options.reference_camera && !options.reference_hfov_deg && !options.source_camera;
     // Placing costs hundreds of evaluations: fewer frames tell enough.
     const WorkingImages few = some_frames(images, kFrames / 2);
+    const InverseDepths inverse = inverse_depths(few.pyramid.at(kCoarse));
     std::vector<Candidate> candidates;
     for (const SearchCandidate& peak : found) {
         CandidateReport entry;
@@ -310,7 +314,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         if (initial) candidate.rig.source_from_reference.translation = initial->t();
         const Level level = make_level(few, steps[0].factor, candidate.rig, num_threads);
         candidate.merit = merit(pooled(level, candidate.rig, num_threads));
-        if (searches && !initial) place(level, focal_free, options, candidate);
+        if (searches && !initial) place(level, inverse, focal_free, options, candidate);
         candidate.share_limit = 0.8 * pooled(level, candidate.rig, num_threads).valid_share;
         candidates.push_back(candidate);
         out.candidates.push_back(entry);

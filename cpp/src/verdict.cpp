@@ -65,10 +65,10 @@ double median_distance(const Level& level, const Rig& a, const Rig& b) {
     std::vector<double> distances;
     std::vector<float> ua(level.width), va(level.width), ub(level.width), vb(level.width);
     std::vector<std::uint8_t> ok_a(level.width), ok_b(level.width);
-    for (const NecFrame& frame : level.frames)
+    for (const auto& pair : level.pairs)
         for (int y = 0; y < level.height; y += 8) {
-            map_row(to_a, frame.depth.row(y), y, level.width, ua.data(), va.data(), ok_a.data());
-            map_row(to_b, frame.depth.row(y), y, level.width, ub.data(), vb.data(), ok_b.data());
+            map_row(to_a, pair->depth().row(y), y, level.width, ua.data(), va.data(), ok_a.data());
+            map_row(to_b, pair->depth().row(y), y, level.width, ub.data(), vb.data(), ok_b.data());
             for (int x = 0; x < level.width; x += 8)
                 if ((ok_a[x] | ok_b[x]) == 0)
                     distances.push_back(scale * std::hypot(ua[x] - ub[x], va[x] - vb[x]));
@@ -109,10 +109,9 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
     }
 
     // Where the fit is some pixels off, coarse edges still meet and fine ones do not.
-    const LevelReport& finest = report.levels.back();
-    const auto coarse = std::find_if(report.levels.rbegin(), report.levels.rend(),
-                                     [](const LevelReport& l) { return l.factor >= 4; });
-    const double coarse_nec = coarse == report.levels.rend() ? finest.nec : coarse->nec;
+    const double coarse_nec =
+        pooled(make_nec_level(images, kCoarse, rig, options.num_threads), rig, options.num_threads)
+            .nec;
 
     report.converged = false;
     if (pairs < 2) report.message = "1 image pair is too few to trust, expected at least 2";
@@ -126,11 +125,11 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
             "edges agree hardly better than displaced ones: NEC stands out by "
             "%.1f deviations, expected at least %.0f",
             report.contrast, kContrast);
-    else if (finest.nec < kDetail * coarse_nec)
+    else if (report.nec < kDetail * coarse_nec)
         report.message = format(
             "only coarse edges agree: NEC falls from %.3f at 1/%d of the size to %.3f, expected at "
             "least %.3f",
-            coarse_nec, coarse->factor, finest.nec, kDetail * coarse_nec);
+            coarse_nec, kCoarse, report.nec, kDetail * coarse_nec);
     else if (report.repeatability_px > kRepeatability)
         report.message = format(
             "two halves of the frames disagree by %.2f px, expected at most "

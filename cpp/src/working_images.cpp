@@ -41,8 +41,10 @@ void for_frame(const char* name, int index, const Work& work) {
     }
 }
 
-// Depth without its edges: across one, the warp shows a surface beside another that the source
-// camera may not see there at all, and the step between them moves with the depth, not the rig.
+// Depth without its edges, for the finer levels (at coarser ones nearly everything is near an edge,
+// and a pixel's width matters less): across one, the warp shows a surface beside another that the
+// source camera may not see there at all, and the step between them moves with the depth, not the
+// rig.
 Image without_depth_edges(const Image& depth) {
     constexpr float kEdge = 1.1f;
     Image out = depth;
@@ -58,9 +60,6 @@ Image without_depth_edges(const Image& depth) {
         }
     return out;
 }
-
-// At coarser levels nearly everything is near a depth edge, and a pixel's width matters less.
-constexpr int kFinest = 2;
 
 }  // namespace
 
@@ -94,8 +93,11 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     WorkingImages images;
     images.references.resize(count);
     images.sources.resize(count);
+    images.reference_edges.resize(count);
+    images.source_edges.resize(count);
     for (int factor : kFactors)
-        images.pyramid[factor] = {std::vector<Image>(count), std::vector<Image>(count)};
+        images.pyramid[factor] = {std::vector<Image>(count), std::vector<Image>(count),
+                                  std::vector<EdgeMap>(factor >= kCoarse ? count : 0)};
     parallel_ranges(static_cast<int>(count), num_threads, [&](int begin, int end) {
         for (int i = begin; i < end; ++i) {
             const int frame = chosen[i];
@@ -105,6 +107,8 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
             });
             for_frame("source", frame,
                       [&] { images.sources[i] = normalize_percentiles(to_gray(sources[frame])); });
+            images.source_edges[i] = edge_map(images.sources[i]);
+            images.reference_edges[i] = edge_map(images.references[i]);
             Image depth;
             for_frame("depth", frame, [&] {
                 depth = resize_depth(clean_depth(depths[frame]), width, height);
@@ -113,12 +117,13 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
                     throw std::invalid_argument(
                         "no depth is known, expected finite metres > 0 in some pixels");
             });
-            for (auto& [factor, reduced] : images.pyramid) {
+            for (auto& [factor, level] : images.pyramid) {
                 const int w = std::max(1, static_cast<int>(std::lround(width / double(factor))));
                 const int h = std::max(1, static_cast<int>(std::lround(height / double(factor))));
-                reduced.references[i] = resize_area(images.references[i], w, h);
-                reduced.depths[i] = resize_depth(depth, w, h);
-                if (factor <= kFinest) reduced.depths[i] = without_depth_edges(reduced.depths[i]);
+                level.references[i] = resize_area(images.references[i], w, h);
+                level.depths[i] = resize_depth(depth, w, h);
+                if (factor >= kCoarse) level.edges[i] = reduced(images.reference_edges[i], w, h);
+                else level.depths[i] = without_depth_edges(level.depths[i]);
             }
         }
     });
@@ -130,45 +135,90 @@ WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) con
     for (std::size_t i : indices) {
         out.references.push_back(references[i]);
         out.sources.push_back(sources[i]);
-        for (const auto& [factor, reduced] : pyramid) {
-            out.pyramid[factor].references.push_back(reduced.references[i]);
-            out.pyramid[factor].depths.push_back(reduced.depths[i]);
+        out.reference_edges.push_back(reference_edges[i]);
+        out.source_edges.push_back(source_edges[i]);
+        for (const auto& [factor, level] : pyramid) {
+            ReducedImages& target = out.pyramid[factor];
+            target.references.push_back(level.references[i]);
+            target.depths.push_back(level.depths[i]);
+            if (factor >= kCoarse) target.edges.push_back(level.edges[i]);
         }
     }
     return out;
 }
 
-Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads) {
+namespace {
+
+// Source pixels to a reference pixel at this level, along the width, if the source were so wide.
+double density_at(const Level& level, int source_width, const Rig& rig) {
+    return (rig.source.fx / rig.source.width * source_width) /
+           (rig.reference.fx / rig.reference.width * level.width);
+}
+
+// A level without its pairs: its sizes, for sources of the given size at most. Where a reference
+// pixel holds more than one source pixel, they are averaged first (they would alias).
+Level level_for(const WorkingImages& images, int factor, int source_width, int source_height,
+                const Rig& rig) {
     Level level;
     level.factor = factor;
-    const ReducedImages& reduced = images.pyramid.at(factor);
-    const Image& source = images.sources[0];
-    level.width = reduced.references[0].width;
-    level.height = reduced.references[0].height;
-    // Source pixels to a reference pixel of this level: more are averaged first (they would
-    // alias), fewer mean that the reference is finer than its partner, and is blurred to match.
-    const double density = (rig.source.fx / rig.source.width * source.width) /
-                           (rig.reference.fx / rig.reference.width * level.width);
-    const double shrink = std::max(1.0, density);
-    level.source_width = std::max(8, static_cast<int>(std::lround(source.width / shrink)));
-    level.source_height = std::max(8, static_cast<int>(std::lround(source.height / shrink)));
-    const double reference_blur = kBlur * std::max(1.0, 1 / density);
+    const Image& depth = images.pyramid.at(factor).depths[0];
+    level.width = depth.width;
+    level.height = depth.height;
+    const double shrink = std::max(1.0, density_at(level, source_width, rig));
+    level.source_width = std::max(8, static_cast<int>(std::lround(source_width / shrink)));
+    level.source_height = std::max(8, static_cast<int>(std::lround(source_height / shrink)));
+    return level;
+}
+
+// Fills the level with make_pair(index).
+template <class MakePair>
+void fill(Level& level, std::size_t count, const Rig& rig, int num_threads,
+          const MakePair& make_pair) {
     const Rig at_level = level.rig_at(rig);
-    const int count = static_cast<int>(images.references.size());
-    level.frames.resize(count);
+    level.pairs.resize(count);
     level.weights.resize(count);
-    parallel_ranges(count, num_threads, [&](int begin, int end) {
+    parallel_ranges(static_cast<int>(count), num_threads, [&](int begin, int end) {
         for (int i = begin; i < end; ++i) {
-            level.frames[i] = make_nec_frame(
-                gaussian_blur(reduced.references[i], reference_blur),
-                gaussian_blur(
-                    resize_area(images.sources[i], level.source_width, level.source_height), kBlur),
-                reduced.depths[i], at_level);
-            level.weights[i] = evaluate_nec(level.frames[i], at_level).norm;
+            level.pairs[i] = make_pair(i);
+            level.weights[i] = level.pairs[i]->evaluate(at_level).norm;
         }
     });
     const double sum = std::accumulate(level.weights.begin(), level.weights.end(), 0.0);
-    for (double& weight : level.weights) weight = sum > 0 ? weight / sum : 1.0 / count;
+    for (double& weight : level.weights)
+        weight = sum > 0 ? weight / sum : 1.0 / static_cast<double>(count);
+}
+
+}  // namespace
+
+Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads) {
+    const Image& source = images.sources[0];
+    Level level = level_for(images, factor, source.width, source.height, rig);
+    const double density = density_at(level, source.width, rig);
+    const ReducedImages& reduced = images.pyramid.at(factor);
+    // Where the reference is finer than its partner, it is blurred to match.
+    const double reference_blur = kBlur * std::max(1.0, 1 / density);
+    const Rig at_level = level.rig_at(rig);
+    fill(level, images.size(), rig, num_threads, [&](int i) {
+        return std::make_unique<NecPair>(make_nec_frame(
+            gaussian_blur(reduced.references[i], reference_blur),
+            gaussian_blur(resize_area(images.sources[i], level.source_width, level.source_height),
+                          kBlur),
+            reduced.depths[i], at_level));
+    });
+    return level;
+}
+
+Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads) {
+    if (factor < kCoarse) return make_nec_level(images, factor, rig, num_threads);
+    const EdgeMap& source = images.source_edges[0];
+    Level level = level_for(images, factor, source.width, source.height, rig);
+    const ReducedImages& level_images = images.pyramid.at(factor);
+    fill(level, images.size(), rig, num_threads, [&](int i) {
+        return std::make_unique<EdgePair>(
+            level_images.edges[i],
+            reduced(images.source_edges[i], level.source_width, level.source_height),
+            level_images.depths[i]);
+    });
     return level;
 }
 

@@ -2,21 +2,24 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <vector>
 
+#include "image_pair.hpp"
 #include "xcalib/calibrate.hpp"
-#include "xcalib/nec.hpp"
 
 namespace xcalib {
 
 // References and depths at one level of the pyramid: what no rig changes.
 struct ReducedImages {
     std::vector<Image> references, depths;
+    std::vector<EdgeMap> edges;  // of the references, at the coarse levels
 };
 
 struct WorkingImages {
-    std::vector<Image> references;         // gray, normalized, reduced by a whole factor
-    std::vector<Image> sources;            // gray, normalized, as large as given
+    std::vector<Image> references;  // gray, normalized, reduced by a whole factor
+    std::vector<Image> sources;     // gray, normalized, as large as given
+    std::vector<EdgeMap> reference_edges, source_edges;
     std::map<int, ReducedImages> pyramid;  // by the factor of kFactors
 
     std::size_t size() const { return references.size(); }
@@ -25,6 +28,8 @@ struct WorkingImages {
 };
 
 inline constexpr int kFactors[] = {8, 4, 2, 1};
+// From this factor on, edge maps are compared; the finer levels maximize the NEC itself.
+inline constexpr int kCoarse = 4;
 
 // Checks what was given, and throws naming the frame by its index in the caller's lists.
 void validate_frames(const std::vector<ImageView>& references,
@@ -41,7 +46,7 @@ struct Level {
     int factor = 1;
     int width = 0, height = 0;  // of the reference
     int source_width = 0, source_height = 0;
-    std::vector<NecFrame> frames;
+    std::vector<std::unique_ptr<ImagePair>> pairs;
     std::vector<double> weights;  // c_i / sum c_i at `rig`
 
     Rig rig_at(const Rig& rig) const {
@@ -49,5 +54,7 @@ struct Level {
     }
 };
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
+// The same with the NEC at any factor.
+Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 
 }  // namespace xcalib

@@ -133,10 +133,12 @@ struct OnePair {
     SolverParameters parameters;
     ceres::Problem problem;
 
+    NecPair pair;
+
     OnePair(const NecFrame& frame, const Rig& rig, double weight, bool with_reference)
-        : parameters(solver_from_rig(rig)) {
+        : parameters(solver_from_rig(rig)), pair(frame) {
         problem.AddResidualBlock(
-            new NecCost(frame, rig.source.width, rig.source.height, weight, 0.0, with_reference),
+            new NecCost(pair, rig.source.width, rig.source.height, weight, 0.0, with_reference),
             nullptr, NecCost::blocks(parameters));
         problem.SetManifold(parameters.quaternion, new ceres::QuaternionManifold);
     }
@@ -240,13 +242,14 @@ TEST(NecCost, APairThatLosesItsOverlapIsChargedForIt) {
     const Scene scene = smooth_scene(6, 1);
     const Rig away = turned(scene.rig, {0, 0.45, 0});
     const double share = evaluate_nec(scene.frame, away).valid_share;
+    const NecPair images(scene.frame);
     ASSERT_GT(share, 0.05);
     ASSERT_LT(share, 0.8);
     SolverParameters p = solver_from_rig(away);
     std::vector<const double*> blocks;
     for (const double* block : NecCost::blocks(p)) blocks.push_back(block);
     const auto cost_with = [&](double minimum_share) {
-        const NecCost cost(scene.frame, away.source.width, away.source.height, 1.0, minimum_share,
+        const NecCost cost(images, away.source.width, away.source.height, 1.0, minimum_share,
                            false);
         std::vector<double> residuals(cost.num_residuals());
         EXPECT_TRUE(cost.Evaluate(blocks.data(), residuals.data(), nullptr));
@@ -261,8 +264,8 @@ TEST(NecCost, APairThatLosesItsOverlapIsChargedForIt) {
 
 TEST(NecCost, BlocksThatAreNotAskedForMayBeLeftOut) {
     const Scene scene = smooth_scene(7, 1, 80, 60);
-    const NecCost cost(scene.frame, scene.rig.source.width, scene.rig.source.height, 1.0, 0.0,
-                       true);
+    const NecPair images(scene.frame);
+    const NecCost cost(images, scene.rig.source.width, scene.rig.source.height, 1.0, 0.0, true);
     SolverParameters p = solver_from_rig(scene.rig);
     std::vector<const double*> blocks;
     for (const double* block : NecCost::blocks(p)) blocks.push_back(block);

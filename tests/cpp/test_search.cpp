@@ -75,6 +75,12 @@ Scene make_scene(unsigned seed, double source_hfov_deg, const Eigen::Vector3d& t
     return scene;
 }
 
+std::vector<EdgeMap> edge_maps(const std::vector<Image>& images) {
+    std::vector<EdgeMap> maps;
+    for (const Image& image : images) maps.push_back(edge_map(image));
+    return maps;
+}
+
 SearchSpace space_around(const Scene& scene) {
     SearchSpace space;
     SearchHypothesis hypothesis{scene.truth.reference, {}};
@@ -108,7 +114,8 @@ constexpr double kFewPixels = 8;
 
 TEST(Search, FindsTheSameFieldOfViewTurned) {
     const Scene scene = make_scene(1, 60, {3, -5, 0});
-    const auto found = global_search(scene.references, scene.sources, space_around(scene), 2);
+    const auto found = global_search(edge_maps(scene.references), edge_maps(scene.sources),
+                                     space_around(scene), 2);
     ASSERT_FALSE(found.empty());
     EXPECT_LT(distance(found[0].rig, scene.truth), kFewPixels);
     EXPECT_EQ(found[0].rig.t(), Eigen::Vector3d::Zero());
@@ -117,7 +124,8 @@ TEST(Search, FindsTheSameFieldOfViewTurned) {
 
 TEST(Search, FindsANarrowerSourceOffTheAxis) {
     const Scene scene = make_scene(2, 38, {-4, 8, 1});
-    const auto found = global_search(scene.references, scene.sources, space_around(scene), 2);
+    const auto found = global_search(edge_maps(scene.references), edge_maps(scene.sources),
+                                     space_around(scene), 2);
     ASSERT_FALSE(found.empty());
     EXPECT_LT(distance(found[0].rig, scene.truth), kFewPixels);
     EXPECT_NEAR(std::tan(found[0].rig.source.hfov() / 2) / std::tan(19 * kDegree), 1, 0.08);
@@ -125,7 +133,8 @@ TEST(Search, FindsANarrowerSourceOffTheAxis) {
 
 TEST(Search, FindsAWiderSourceRolled) {
     const Scene scene = make_scene(3, 85, {2, 6, -4});
-    const auto found = global_search(scene.references, scene.sources, space_around(scene), 2);
+    const auto found = global_search(edge_maps(scene.references), edge_maps(scene.sources),
+                                     space_around(scene), 2);
     ASSERT_FALSE(found.empty());
     EXPECT_LT(distance(found[0].rig, scene.truth), kFewPixels);
 }
@@ -135,7 +144,8 @@ TEST(Search, SearchesAroundTheRotationThatItIsGiven) {
     SearchSpace space = space_around(scene);
     space.base = turned({}, Eigen::Vector3d(5, 28, 0) * kDegree).R();
     space.max_shift = 0.15;
-    const auto found = global_search(scene.references, scene.sources, space, 2);
+    const auto found =
+        global_search(edge_maps(scene.references), edge_maps(scene.sources), space, 2);
     ASSERT_FALSE(found.empty());
     EXPECT_LT(distance(found[0].rig, scene.truth), kFewPixels);
 }
@@ -145,7 +155,7 @@ TEST(Search, StaysWithinTheShiftThatItIsGiven) {
     SearchSpace space = space_around(scene);
     space.max_shift = 0.1;  // 18 deg are about 0.3
     for (const SearchCandidate& candidate :
-         global_search(scene.references, scene.sources, space, 2)) {
+         global_search(edge_maps(scene.references), edge_maps(scene.sources), space, 2)) {
         const Eigen::AngleAxisd turn(candidate.rig.R());
         EXPECT_LT(std::abs(turn.angle() * turn.axis().y()), 8 * kDegree);
     }
@@ -156,7 +166,8 @@ TEST(Search, CandidatesComeBestFirstAreDistinctAndNoMoreThanAskedFor) {
     SearchSpace space = space_around(scene);
     for (const int most : {1, 5}) {
         space.candidates = most;
-        const auto found = global_search(scene.references, scene.sources, space, 2);
+        const auto found =
+            global_search(edge_maps(scene.references), edge_maps(scene.sources), space, 2);
         ASSERT_FALSE(found.empty());
         EXPECT_LE(found.size(), static_cast<std::size_t>(most));
         for (std::size_t i = 0; i < found.size(); ++i) {
@@ -174,10 +185,11 @@ TEST(Search, CandidatesComeBestFirstAreDistinctAndNoMoreThanAskedFor) {
 TEST(Search, TheNumberOfThreadsHasNoSay) {
     const Scene scene = make_scene(7, 50, {2, 3, 2}, 2);
     const SearchSpace space = space_around(scene);
-    const auto one = global_search(scene.references, scene.sources, space, 1);
+    const auto one = global_search(edge_maps(scene.references), edge_maps(scene.sources), space, 1);
     ASSERT_FALSE(one.empty());
     for (const int threads : {1, 2, 3}) {
-        const auto other = global_search(scene.references, scene.sources, space, threads);
+        const auto other =
+            global_search(edge_maps(scene.references), edge_maps(scene.sources), space, threads);
         ASSERT_EQ(other.size(), one.size());
         for (std::size_t i = 0; i < one.size(); ++i) {
             EXPECT_EQ(other[i].score, one[i].score);

@@ -37,12 +37,17 @@ Scene make_scene(unsigned seed) {
         scene.images.sources.push_back(source_view(
             scene.truth, [&](double x, double y) { return 1 - texture(x, y); }, depth));
         scene.depths.push_back(drawn(depth, kWidth, kHeight));
+        scene.images.reference_edges.push_back(edge_map(scene.images.references[i]));
+        scene.images.source_edges.push_back(edge_map(scene.images.sources[i]));
         for (int factor : kFactors) {
             const int width = static_cast<int>(std::lround(kWidth / double(factor)));
             const int height = static_cast<int>(std::lround(kHeight / double(factor)));
             ReducedImages& reduced = scene.images.pyramid[factor];
             reduced.references.push_back(resize_area(scene.images.references[i], width, height));
             reduced.depths.push_back(resize_depth(scene.depths[i], width, height));
+            if (factor >= kCoarse)
+                reduced.edges.push_back(
+                    xcalib::reduced(scene.images.reference_edges[i], width, height));
         }
     }
     return scene;
@@ -256,7 +261,7 @@ TEST(Pooled, IsTheWeightedMeanOverThePairs) {
     const Level level = make_level(scene.images, 1, rig, 2);
     double weights = 0, nec = 0, share = 0;
     for (std::size_t i = 0; i < 3; ++i) {
-        const NecValue value = evaluate_nec(level.frames[i], level.rig_at(rig));
+        const NecValue value = level.pairs[i]->evaluate(level.rig_at(rig));
         weights += level.weights[i];
         nec += level.weights[i] * value.nec;
         share += value.valid_share / 3;

@@ -70,7 +70,8 @@ struct NecNormalEquations {
 NecNormalEquations nec_normal_equations(const NecFrame& frame, const Rig& rig, int count);
 
 // The rows themselves, for tests and small images only: r and J, two rows for each pixel where both
-// images are sampled and the source has an edge, and one row for all that is left of the reference's.
+// images are sampled and the source has an edge, and one row for all that is left of the
+// reference's.
 struct NecRows {
     Eigen::VectorXd residuals;
     Eigen::MatrixXd jacobian;

@@ -1,17 +1,15 @@
 // The global search that starts a calibration: no initial guess is needed.
 //
-// With the doubled angle, z = a exp(2 i theta), the polarity drops out, and Re sum conj(z_R) z_S =
-// sum a b cos 2d is one correlation: its Fourier product gives every displacement at once. It is
-// Eq. (nec) with 2 cos^2 d - 1 in place of |cos d|, which is zero on average where edges meet by
-// chance, and so stands out more. Both images are first drawn on a Mercator map of viewing
-// directions, where a rotation of the camera is, near the horizon, a translation whatever the field
-// of view; focal lengths and roll are looped over, and the frames of the rig pooled.
+// Edge maps correlate as they are: the Fourier product of conj(z_R) and z_S gives every
+// displacement at once. Both are first drawn on a Mercator map of viewing directions, where a
+// rotation of the camera is, near the horizon, a translation whatever the field of view; focal
+// lengths and roll are looped over, and the frames of the rig pooled.
 #pragma once
 
 #include <vector>
 
 #include "xcalib/camera.hpp"
-#include "xcalib/image.hpp"
+#include "xcalib/edge_map.hpp"
 
 namespace xcalib {
 
@@ -38,9 +36,9 @@ struct SearchCandidate {
     double overlap = 0.0;
 };
 
-// `references` and `sources`: gray, one size each, as many of the one as of the other. Best first.
-std::vector<SearchCandidate> global_search(const std::vector<Image>& references,
-                                           const std::vector<Image>& sources,
+// `references` and `sources`: one size each, as many of the one as of the other. Best first.
+std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& references,
+                                           const std::vector<EdgeMap>& sources,
                                            const SearchSpace& space, int num_threads);
 
 }  // namespace xcalib

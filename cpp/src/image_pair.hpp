@@ -1,0 +1,51 @@
+// A pair of images at one level, as the solver sees it: something that is compared through a rig.
+#pragma once
+
+#include "xcalib/edge_map.hpp"
+#include "xcalib/nec.hpp"
+
+namespace xcalib {
+
+class ImagePair {
+   public:
+    virtual ~ImagePair() = default;
+    // `rig` must have the level's sizes.
+    virtual NecValue evaluate(const Rig& rig) const = 0;
+    // Gauss-Newton for 1 - evaluate(rig).nec. `count`: kNumWithoutReference or kNumParameters.
+    virtual NecNormalEquations normal_equations(const Rig& rig, int count) const = 0;
+    virtual const Image& depth() const = 0;  // on the reference's grid [m]
+};
+
+// Eq. (nec).
+class NecPair : public ImagePair {
+   public:
+    explicit NecPair(NecFrame frame) : frame_(std::move(frame)) {}
+    NecValue evaluate(const Rig& rig) const override { return evaluate_nec(frame_, rig); }
+    NecNormalEquations normal_equations(const Rig& rig, int count) const override {
+        return nec_normal_equations(frame_, rig, count);
+    }
+    const Image& depth() const override { return frame_.depth; }
+
+   private:
+    NecFrame frame_;
+};
+
+// The normalized correlation of edge maps: with Z = z / ||z|| over the valid pixels,
+// r = Z_R - Z_S and half the sum of squares is 1 minus it.
+class EdgePair : public ImagePair {
+   public:
+    EdgePair(EdgeMap reference, EdgeMap source, Image depth);
+    NecValue evaluate(const Rig& rig) const override;
+    NecNormalEquations normal_equations(const Rig& rig, int count) const override;
+    const Image& depth() const override { return depth_; }
+
+   private:
+    template <int kCount>
+    NecNormalEquations normal_equations_of(const Rig& rig) const;
+
+    EdgeMap reference_, source_;
+    Image depth_;
+    double reference_energy_ = 0.0;
+};
+
+}  // namespace xcalib
