@@ -139,6 +139,16 @@ Eigen::Vector2d project(const Pinhole& camera, const Eigen::Vector3d& x_in_camer
     return {camera.fx * x + camera.skew * y + camera.cx, camera.fy * y + camera.cy};
 }
 
+Rig turn_source(const Rig& rig, const Eigen::Vector3d& rotation) {
+    const double angle = rotation.norm();
+    if (angle == 0) return rig;
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle, rotation / angle));
+    Rig out = rig;
+    out.source_from_reference.rotation = (turn * rig.source_from_reference.rotation).normalized();
+    out.source_from_reference.translation = turn * rig.t();
+    return out;
+}
+
 Eigen::Matrix3d infinite_homography(const Rig& rig) {
     return rig.source.K() * rig.R() * rig.reference.K().inverse();
 }

@@ -15,14 +15,9 @@ cv::Mat as_mat(const Image& image) {
 }
 
 template <class T>
-const T* view_row(const ImageView& image, int y) {
-    return reinterpret_cast<const T*>(static_cast<const char*>(image.data) + y * image.row_bytes);
-}
-
-template <class T>
 void gray_rows(const ImageView& image, float scale, Image& gray) {
     for (int y = 0; y < image.height; ++y) {
-        const T* in = view_row<T>(image, y);
+        const T* in = image.row<T>(y);
         float* out = gray.row(y);
         if (image.channels == 1) {
             for (int x = 0; x < image.width; ++x) out[x] = scale * static_cast<float>(in[x]);
@@ -186,7 +181,7 @@ Image clean_depth(const ImageView& depth) {
         throw std::invalid_argument("depth must be one float32 channel in metres");
     Image out(depth.width, depth.height);
     for (int y = 0; y < depth.height; ++y) {
-        const float* in = view_row<float>(depth, y);
+        const float* in = depth.row<float>(y);
         for (int x = 0; x < depth.width; ++x) out.row(y)[x] = known(in[x]) ? in[x] : 0.0f;
     }
     return out;

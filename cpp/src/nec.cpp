@@ -78,6 +78,7 @@ double nec(const Image& reference, const Image& registered, const std::uint8_t* 
 }
 
 EdgeField edge_field(const Image& image, float mean_magnitude) {
+    const float floor = kEdgeFloor * mean_magnitude, cap = kEdgeCap * mean_magnitude;
     EdgeField field{image.width, image.height, {}, {}};
     field.x.assign(image.pixels.size(), 0.0f);
     field.y.assign(image.pixels.size(), 0.0f);
@@ -87,8 +88,8 @@ EdgeField edge_field(const Image& image, float mean_magnitude) {
             const float gx = 0.5f * (p[1] - p[-1]);
             const float gy = 0.5f * (p[image.width] - p[-image.width]);
             const float g = std::sqrt(gx * gx + gy * gy);
-            if (!(g > mean_magnitude)) continue;
-            const float rise = std::min(g, kUpperClamp * mean_magnitude) - mean_magnitude;
+            if (!(g > floor)) continue;
+            const float rise = std::min(g, cap) - floor;
             const std::size_t i = static_cast<std::size_t>(y) * image.width + x;
             field.x[i] = gx * rise / g;
             field.y[i] = gy * rise / g;

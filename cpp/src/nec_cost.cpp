@@ -82,12 +82,13 @@ bool NecCost::Evaluate(double const* const* parameters, double* residuals,
     // be aligned, since some edges coincide by chance. Each step is still tested by its cost. Below
     // g^T H^+ g / 2c the block could not carry the cost.
     const double cost = cost_of(equations.value);
-    const Eigen::VectorXd explained =
-        compress(weight_ * equations.hessian, weight_ * equations.gradient, 0).residuals;
-    const double amplitude = std::max(0.5 * std::max(equations.value.aligned, 0.1),
-                                      explained.squaredNorm() / (2 * cost));
-    const CompressedBlock block =
-        compress(weight_ * amplitude * equations.hessian, weight_ * equations.gradient, cost);
+    CompressedBlock block = compress(weight_ * equations.hessian, weight_ * equations.gradient, 0);
+    const double explained = block.residuals.squaredNorm();  // g^T H^+ g
+    const double amplitude =
+        std::max(0.5 * std::max(equations.value.aligned, 0.1), explained / (2 * cost));
+    block.jacobian *= std::sqrt(amplitude);
+    block.residuals /= std::sqrt(amplitude);
+    block.residuals[count] = std::sqrt(std::max(0.0, 2 * cost - explained / amplitude));
     std::copy_n(block.residuals.data(), count + 1, residuals);
     for (int b = 0; b < kNumBlocks; ++b) {
         if (!jacobians[b]) continue;

@@ -37,7 +37,7 @@ struct Stencil {
     const WarpedRow *above, *here, *below;
     const float *reference_x, *reference_y;  // with room past the end
     int width;
-    float mean;
+    float floor, cap;  // of the source's gradient
 };
 
 struct RowSums {
@@ -186,11 +186,11 @@ struct Clamped {
     Float along, across;
 };
 
-HWY_INLINE Clamped clamped(Float magnitude, float mean) {
+HWY_INLINE Clamped clamped(Float magnitude, float floor, float cap) {
     const FloatTag d;
-    const Mask saturated = hn::Ge(magnitude, hn::Set(d, kUpperClamp * mean));
-    const Float rise = hn::IfThenElse(saturated, hn::Set(d, (kUpperClamp - 1) * mean),
-                                      hn::Sub(magnitude, hn::Set(d, mean)));
+    const Mask saturated = hn::Ge(magnitude, hn::Set(d, cap));
+    const Float rise =
+        hn::IfThenElse(saturated, hn::Set(d, cap - floor), hn::Sub(magnitude, hn::Set(d, floor)));
     return {hn::IfThenElse(saturated, hn::Zero(d), hn::Set(d, 1.0f)), hn::Div(rise, magnitude)};
 }
 
@@ -204,8 +204,8 @@ RowSums sum_row(const Stencil& s) {
         const Float ay = hn::IfThenElseZero(g.valid, hn::LoadU(d, s.reference_y + x));
         const Float a2 = hn::MulAdd(ax, ax, hn::Mul(ay, ay));
         add(aa, a2);
-        const Mask edge = hn::And(g.valid, hn::Gt(g.magnitude, hn::Set(d, s.mean)));
-        const Float across = clamped(g.magnitude, s.mean).across;
+        const Mask edge = hn::And(g.valid, hn::Gt(g.magnitude, hn::Set(d, s.floor)));
+        const Float across = clamped(g.magnitude, s.floor, s.cap).across;
         const Float vx = hn::IfThenElseZero(edge, hn::Mul(across, g.x));
         const Float vy = hn::IfThenElseZero(edge, hn::Mul(across, g.y));
         const Float v2 = hn::MulAdd(vx, vx, hn::Mul(vy, vy));
@@ -229,7 +229,7 @@ RowSums append_row(const Stencil& s, Tile& tile) {
         const Float ax = hn::IfThenElseZero(g.valid, hn::LoadU(d, s.reference_x + x));
         const Float ay = hn::IfThenElseZero(g.valid, hn::LoadU(d, s.reference_y + x));
         add(aa, hn::MulAdd(ax, ax, hn::Mul(ay, ay)));
-        const Mask edge = hn::And(g.valid, hn::Gt(g.magnitude, hn::Set(d, s.mean)));
+        const Mask edge = hn::And(g.valid, hn::Gt(g.magnitude, hn::Set(d, s.floor)));
         count += static_cast<int>(
             hn::CompressStore(hn::Iota(di, x), hn::RebindMask(di, edge), di, edges + count));
     }
@@ -251,7 +251,7 @@ RowSums append_row(const Stencil& s, Tile& tile) {
         const auto g = difference(s.here->value.data(), s.here->value.data(), s.above->value.data(),
                                   s.below->value.data());
         const Float magnitude = hn::Sqrt(hn::MulAdd(g[0], g[0], hn::Mul(g[1], g[1])));
-        const Clamped v = clamped(magnitude, s.mean);
+        const Clamped v = clamped(magnitude, s.floor, s.cap);
         const Float vx = hn::Mul(v.across, g[0]), vy = hn::Mul(v.across, g[1]);
         const Float ax = hn::GatherIndex(d, s.reference_x, x);
         const Float ay = hn::GatherIndex(d, s.reference_y, x);
@@ -374,7 +374,8 @@ void for_each_row(const NecFrame& frame, const Rig& rig, int count, const Work& 
         std::copy_n(frame.reference.x.data() + offset, width, reference_x.data());
         std::copy_n(frame.reference.y.data() + offset, width, reference_y.data());
         work(Stencil{&rows[(y - 1) % 3], &rows[y % 3], &rows[(y + 1) % 3], reference_x.data(),
-                     reference_y.data(), width, frame.source_mean});
+                     reference_y.data(), width, kEdgeFloor * frame.source_mean,
+                     kEdgeCap * frame.source_mean});
     }
 }
 

@@ -9,9 +9,6 @@
 
 namespace xcalib {
 
-// Gradient magnitudes are capped at this many times their mean, Eq. (gradient_clamping).
-inline constexpr float kUpperClamp = 5.0f;
-
 // Pixels count whose whole stencil is valid. a n_R and v = b n_S are the clamped gradient vectors.
 struct NecSums {
     double aa = 0;          // sum of |a n_R|^2

@@ -67,11 +67,6 @@ RowSampler row_sampler(PixelType type, int channels) {
     throw std::invalid_argument("unknown pixel type");
 }
 
-const float* depth_row(const ImageView& depth, int y) {
-    return reinterpret_cast<const float*>(static_cast<const char*>(depth.data) +
-                                          y * depth.row_bytes);
-}
-
 void require_size(const char* name, int width, int height, const Pinhole& camera) {
     if (width == camera.width && height == camera.height) return;
     std::ostringstream message;
@@ -108,7 +103,7 @@ void Registrar::map(const ImageView& depth, float* out) const {
         std::vector<float> u(grid.width), v(grid.width);
         std::vector<std::uint8_t> validity(grid.width);
         for (int y = begin; y < end; ++y) {
-            map_row(reprojection_, depth_row(grid, y), y, grid.width, u.data(), v.data(),
+            map_row(reprojection_, grid.row<float>(y), y, grid.width, u.data(), v.data(),
                     validity.data());
             float* row = out + 2 * static_cast<std::size_t>(y) * grid.width;
             for (int x = 0; x < grid.width; ++x) {
@@ -132,7 +127,7 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
         std::vector<float> u(grid.width), v(grid.width);
         for (int y = begin; y < end; ++y) {
             std::uint8_t* validity = mask + static_cast<std::size_t>(y) * grid.width;
-            map_row(reprojection_, depth_row(grid, y), y, grid.width, u.data(), v.data(), validity);
+            map_row(reprojection_, grid.row<float>(y), y, grid.width, u.data(), v.data(), validity);
             sample(source, u.data(), v.data(), validity, grid.width,
                    static_cast<char*>(registered.data) + y * registered.row_bytes);
         }

@@ -1,18 +1,10 @@
-#include <cstdio>
-
+#include "format.hpp"
 #include "xcalib/calibrate.hpp"
 
 namespace xcalib {
 namespace {
 
 constexpr double kDegrees = 180 / 3.14159265358979323846;
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-    char buffer[512];
-    std::snprintf(buffer, sizeof buffer, pattern, values...);
-    return buffer;
-}
 
 }  // namespace
 

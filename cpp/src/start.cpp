@@ -136,16 +136,6 @@ Rig with_parallax(const Rig& rig, const Eigen::Vector3d& t, double inverse_depth
     return moved;
 }
 
-Rig turned(const Rig& rig, const Eigen::Vector3d& rotation) {
-    const Eigen::Quaterniond turn(Eigen::AngleAxisd(
-        rotation.norm(),
-        rotation.norm() > 0 ? Eigen::Vector3d(rotation.normalized()) : Eigen::Vector3d::UnitZ()));
-    Rig out = rig;
-    out.source_from_reference.rotation = (turn * rig.source_from_reference.rotation).normalized();
-    out.source_from_reference.translation = turn * rig.t();
-    return out;
-}
-
 // The same rig with a reference of another focal length: the source's follows, so that the scale
 // stays, and rotation and translation, so that the middle of the image and its parallax do.
 Rig with_reference_focal(const Rig& rig, double factor) {
@@ -159,7 +149,7 @@ Rig with_reference_focal(const Rig& rig, double factor) {
     // Roll is an angle in the image; pan and tilt are displacements over the focal length.
     const Eigen::Vector3d scaled(vector.x() / factor, vector.y() / factor, vector.z());
     out.source_from_reference.rotation = Eigen::Quaterniond::Identity();
-    out = turned(out, scaled);
+    out = turn_source(out, scaled);
     out.source_from_reference.translation = rig.t() / factor;
     return out;
 }
@@ -230,15 +220,15 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal,
                     rig.source.fx *= scale;
                     rig.source.fy *= scale;
                 }
-                return turned(rig, Eigen::Vector3d(0, 0, (i / side - kReach) / half));
+                return turn_source(rig, Eigen::Vector3d(0, 0, (i / side - kReach) / half));
             },
             candidate);
         const Rig after = candidate.rig;
         choose_best(
             level, options.num_threads, side * side,
             [&](int i) {  // pan and tilt
-                return turned(after,
-                              Eigen::Vector3d((i / side - kReach) / f, (i % side - kReach) / f, 0));
+                return turn_source(
+                    after, Eigen::Vector3d((i / side - kReach) / f, (i % side - kReach) / f, 0));
             },
             candidate);
     }

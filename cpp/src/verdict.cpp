@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
+#include "format.hpp"
 #include "solve.hpp"
 #include "xcalib/warp.hpp"
 
@@ -15,15 +15,6 @@ constexpr double kPi = 3.14159265358979323846;
 
 // Half resolution: fine enough to tell a fit from a near miss, a quarter of the cost.
 constexpr int kFactor = 2;
-
-Rig panned(const Rig& rig, double x, double y) {
-    Rig out = rig;
-    out.source_from_reference.rotation =
-        Eigen::Quaterniond(Eigen::AngleAxisd(-y, Eigen::Vector3d::UnitX()) *
-                           Eigen::AngleAxisd(x, Eigen::Vector3d::UnitY())) *
-        rig.source_from_reference.rotation;
-    return out;
-}
 
 // NEC of the same rig turned off its place: what the footage gives where nothing is aligned.
 struct Baseline {
@@ -37,11 +28,9 @@ Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
     for (double radius : {0.04, 0.07, 0.10})
         for (int i = 0; i < kDirections; ++i) {
             const double angle = 2 * kPi * i / kDirections;
-            values.push_back(pooled(level,
-                                    panned(rig, radius * width * std::cos(angle),
-                                           radius * width * std::sin(angle)),
-                                    num_threads)
-                                 .nec);
+            const Eigen::Vector3d turn(std::sin(angle), std::cos(angle), 0);
+            values.push_back(
+                pooled(level, turn_source(rig, radius * width * turn), num_threads).nec);
         }
     Baseline out{0, 0};
     for (double v : values) out.mean += v / static_cast<double>(values.size());
@@ -76,13 +65,6 @@ double median_distance(const Level& level, const Rig& a, const Rig& b) {
     if (distances.empty()) return INFINITY;
     std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
     return distances[distances.size() / 2];
-}
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-    char buffer[256];
-    std::snprintf(buffer, sizeof buffer, pattern, values...);
-    return buffer;
 }
 
 }  // namespace

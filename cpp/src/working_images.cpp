@@ -11,8 +11,12 @@
 namespace xcalib {
 namespace {
 
-// Camera optics blur by about this much already; bilinear sampling needs it to be smooth. [px]
-constexpr double kBlur = 0.8;
+// Bilinear sampling needs images to be smooth; what this takes of their edges is accuracy. [px]
+constexpr double kBlur = 0.6;
+
+// Source pixels to a reference pixel, in one direction, beyond which they are averaged before they
+// are sampled. Edge maps are averages already; the NEC's edges are sharper for some aliasing.
+constexpr double kEdgeDensity = 1.0, kNecDensity = 2.0;
 
 std::string size_text(const ImageView& view) {
     return std::to_string(view.width) + "x" + std::to_string(view.height);
@@ -155,16 +159,15 @@ double density_at(const Level& level, int source_width, const Rig& rig) {
            (rig.reference.fx / rig.reference.width * level.width);
 }
 
-// A level without its pairs: its sizes, for sources of the given size at most. Where a reference
-// pixel holds more than one source pixel, they are averaged first (they would alias).
+// A level without its pairs: its sizes, for sources of the given size at most.
 Level level_for(const WorkingImages& images, int factor, int source_width, int source_height,
-                const Rig& rig) {
+                double max_density, const Rig& rig) {
     Level level;
     level.factor = factor;
     const Image& depth = images.pyramid.at(factor).depths[0];
     level.width = depth.width;
     level.height = depth.height;
-    const double shrink = std::max(1.0, density_at(level, source_width, rig));
+    const double shrink = std::max(1.0, density_at(level, source_width, rig) / max_density);
     level.source_width = std::max(8, static_cast<int>(std::lround(source_width / shrink)));
     level.source_height = std::max(8, static_cast<int>(std::lround(source_height / shrink)));
     return level;
@@ -192,7 +195,7 @@ void fill(Level& level, std::size_t count, const Rig& rig, int num_threads,
 
 Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads) {
     const Image& source = images.sources[0];
-    Level level = level_for(images, factor, source.width, source.height, rig);
+    Level level = level_for(images, factor, source.width, source.height, kNecDensity, rig);
     const double density = density_at(level, source.width, rig);
     const ReducedImages& reduced = images.pyramid.at(factor);
     // Where the reference is finer than its partner, it is blurred to match.
@@ -211,7 +214,7 @@ Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, in
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads) {
     if (factor < kCoarse) return make_nec_level(images, factor, rig, num_threads);
     const EdgeMap& source = images.source_edges[0];
-    Level level = level_for(images, factor, source.width, source.height, rig);
+    Level level = level_for(images, factor, source.width, source.height, kEdgeDensity, rig);
     const ReducedImages& level_images = images.pyramid.at(factor);
     fill(level, images.size(), rig, num_threads, [&](int i) {
         return std::make_unique<EdgePair>(

@@ -165,7 +165,7 @@ inline SmoothPair smooth_pair(unsigned seed, bool saturated) {
         kSourceWidth, kSourceHeight);
     pair.frame = make_nec_frame(drawn(texture, kWidth, kHeight), source,
                                 drawn(rolling_depth(kWidth, kHeight), kWidth, kHeight), pair.rig);
-    pair.frame.source_mean /= saturated ? 12.0f : 2.5f;
+    pair.frame.source_mean *= saturated ? 0.2f / kEdgeCap : 1.0f;
     return pair;
 }
 

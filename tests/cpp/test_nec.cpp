@@ -51,9 +51,9 @@ double relative_error(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expec
 // --- Edges
 // ----------------------------------------------------------------------------------------
 
-TEST(EdgeField, TakesTheMeanMagnitudeOffAndStopsAtFiveTimes) {
-    // Slopes of 0.5, 2 and 9 along x, then along y; the mean magnitude is given as 1.
-    for (const auto& [slope, expected] : {std::pair{0.5f, 0.0f}, {2.0f, 1.0f}, {9.0f, 4.0f}}) {
+TEST(EdgeField, TakesTheFloorOffAndStopsAtTheCap) {
+    // Slopes along x, then along y; the mean magnitude is given as 1.
+    for (const auto& [slope, expected] : {std::pair{0.25f, 0.0f}, {1.0f, 0.7f}, {9.0f, 1.7f}}) {
         const auto along_x = drawn([s = slope](double x, double) { return s * x; }, 7, 5);
         const auto along_y = drawn([s = slope](double, double y) { return -s * y; }, 7, 5);
         const EdgeField x = edge_field(along_x, 1.0f), y = edge_field(along_y, 1.0f);
@@ -71,9 +71,9 @@ TEST(EdgeField, TakesTheMeanMagnitudeOffAndStopsAtFiveTimes) {
 
 TEST(EdgeField, KeepsTheDirection) {
     const Image ramp = drawn([](double x, double y) { return 3 * x + 4 * y; }, 5, 5);  // g = 5
-    const EdgeField field = edge_field(ramp, 2.0f);
-    EXPECT_NEAR(field.x[12], 3 * 0.6, 1e-5);
-    EXPECT_NEAR(field.y[12], 3 * 0.8, 1e-5);
+    const EdgeField field = edge_field(ramp, 5.0f);  // 1.5 is taken off
+    EXPECT_NEAR(field.x[12], 3 * 0.7, 1e-5);
+    EXPECT_NEAR(field.y[12], 4 * 0.7, 1e-5);
 }
 
 TEST(MeanGradient, IsOverPixelsWhoseStencilIsValid) {

@@ -62,6 +62,9 @@ Eigen::Vector2d project(const Pinhole& camera, const Eigen::Vector3d& x_in_camer
 // Eq. (infinite_homography): K_S R K_R^-1, where pixels at infinite depth go.
 Eigen::Matrix3d infinite_homography(const Rig& rig);
 
+// The source camera turned where it stands, by exp(rotation) about its own axes [rad].
+Rig turn_source(const Rig& rig, const Eigen::Vector3d& rotation);
+
 // The paper's parameterization: unconstrained numbers that are 1 or 0 or 1/2 at its start.
 struct PaperParameters {
     struct Camera {

@@ -19,6 +19,12 @@ struct ImageView {
     int channels = 1;  // 1 or 3
     PixelType type = PixelType::u8;
     std::ptrdiff_t row_bytes = 0;
+
+    // T must be the type's.
+    template <class T>
+    const T* row(int y) const {
+        return reinterpret_cast<const T*>(static_cast<const char*>(data) + y * row_bytes);
+    }
 };
 
 struct MutableImageView {

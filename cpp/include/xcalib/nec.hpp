@@ -26,8 +26,13 @@ enum class NecFloor {
 double nec(const Image& reference, const Image& registered, const std::uint8_t* valid,
            NecFloor floor = NecFloor::none);
 
-// Gradient vectors with the objective's soft floor, n max(min(g, 5 m) - m, 0): noise below the mean
-// magnitude m has no say, and no step stands where it begins to have one.
+// The objective's limits, in mean magnitudes m. A floor of m, or a cap at the 5 m of
+// Eq. (gradient_clamping), leave two to three times the end-point error: many middling edges place
+// a rig better than few strong ones.
+inline constexpr float kEdgeFloor = 0.3f, kEdgeCap = 2.0f;
+
+// Gradient vectors within them, n max(min(g, cap m) - floor m, 0): noise has no say, and no step
+// stands where edges begin to have one.
 struct EdgeField {
     int width = 0;
     int height = 0;
