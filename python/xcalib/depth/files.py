@@ -1,74 +1,21 @@
-"""Depth of the reference frames: from files, or from a prior on the road.
-
-A provider is called with the index of a frame and its reference image and returns the depth map
-``(h, w)`` float32 in metres along the optical axis, 0 where unknown. Its size is free, its aspect
-is that of the reference image.
-"""
+"""Depth maps from files."""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .frames import Image, InputError, decode, list_files, pair, same_aspect, size_of
+from ..frames import Image, InputError, decode, list_files, pair, same_aspect, size_of
+from .provider import Depth
 
 DEPTH_SUFFIXES = (".png", ".npy", ".tif", ".tiff", ".exr")
 PNG_SCALE = 1 / 256
 """Metres per count of a 16-bit PNG (KITTI)."""
-
-Depth = NDArray[np.float32]
-
-
-class DepthProvider(Protocol):
-    """Depth of frame ``index``, whose reference image is given: ``(h, w)`` float32 [m]."""
-
-    def __call__(self, index: int, reference: Image) -> Depth: ...
-
-
-@dataclass(frozen=True)
-class PlaneDepth:
-    """Road-plane prior: a flat road under a level camera, and everything else far away.
-
-    ``D(y) = camera_height * fy / (y - horizon row)``, never beyond ``far``, which is also the
-    depth at and above the horizon.
-    """
-
-    camera_height: float = 1.6
-    """Height of the reference camera above the road [m], > 0."""
-    horizon: float = 0.5
-    """Row of the horizon as a fraction of the image height from the top, (-1, 1)."""
-    far: float = 60.0
-    """Largest depth [m], > 0."""
-    hfov_deg: float = 45.0
-    """Horizontal field of view of the reference camera [deg], (0, 180); pixels are square."""
-
-    def __post_init__(self) -> None:
-        for name, low, high, unit in (
-            ("camera_height", 0.0, math.inf, "m"),
-            ("horizon", -1.0, 1.0, "of the image height"),
-            ("far", 0.0, math.inf, "m"),
-            ("hfov_deg", 0.0, 180.0, "deg"),
-        ):
-            value = getattr(self, name)
-            if not low < value < high:  # NaN fails too
-                between = f"above {low:g}" if high == math.inf else f"between {low:g} and {high:g}"
-                raise InputError(f"plane {name} is {value:g}, expected {between} {unit}")
-
-    def __call__(self, index: int, reference: Image) -> Depth:
-        width, height = size_of(reference)
-        fy = 0.5 * width / math.tan(math.radians(self.hfov_deg) / 2)
-        below = np.arange(height) - (self.horizon * height - 0.5)  # rows below the horizon [px]
-        depth = np.full(height, self.far)
-        road = below > 0
-        depth[road] = np.minimum(self.camera_height * fy / below[road], self.far)
-        return np.repeat(depth.astype(np.float32)[:, None], width, axis=1)
 
 
 class FolderDepth:
@@ -147,29 +94,3 @@ def _read_values(path: Path) -> NDArray[np.generic]:
                 " .npy and .tiff in metres are read everywhere"
             ) from None
     return decode(path)
-
-
-def open_depth(
-    spec: str | Path,
-    reference_paths: Sequence[Path],
-    scale: float = PNG_SCALE,
-    plane: PlaneDepth | None = None,
-) -> DepthProvider:
-    """The depth provider that a ``--depth`` argument names.
-
-    Parameters
-    ----------
-    spec
-        A folder of depth maps, or the word ``plane`` (a folder of that name: ``./plane``).
-    reference_paths
-        Files of the reference images, in the order of the frames.
-    scale
-        Metres per count of 16-bit PNG depth.
-    plane
-        The prior used for ``plane``.
-    """
-    if str(spec) == "plane":
-        return plane or PlaneDepth()
-    if not Path(spec).is_dir():
-        raise InputError(f"depth {spec}: expected an existing folder of depth maps, or `plane`")
-    return FolderDepth(spec, reference_paths, scale)

@@ -1,0 +1,53 @@
+"""Depth of the reference frames: from files, or from a prior on the road.
+
+A provider is called with the index of a frame and its reference image and returns the depth map
+``(h, w)`` float32 in metres along the optical axis, 0 where unknown. Its size is free, its aspect
+is that of the reference image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..frames import InputError
+from .files import DEPTH_SUFFIXES, PNG_SCALE, FolderDepth, read_depth
+from .plane import PlaneDepth
+from .provider import Depth, DepthProvider
+
+__all__ = [
+    "DEPTH_SUFFIXES",
+    "PNG_SCALE",
+    "Depth",
+    "DepthProvider",
+    "FolderDepth",
+    "PlaneDepth",
+    "open_depth",
+    "read_depth",
+]
+
+
+def open_depth(
+    spec: str | Path,
+    reference_paths: Sequence[Path],
+    scale: float = PNG_SCALE,
+    plane: PlaneDepth | None = None,
+) -> DepthProvider:
+    """The depth provider that a ``--depth`` argument names.
+
+    Parameters
+    ----------
+    spec
+        A folder of depth maps, or the word ``plane`` (a folder of that name: ``./plane``).
+    reference_paths
+        Files of the reference images, in the order of the frames.
+    scale
+        Metres per count of 16-bit PNG depth.
+    plane
+        The prior used for ``plane``.
+    """
+    if str(spec) == "plane":
+        return plane or PlaneDepth()
+    if not Path(spec).is_dir():
+        raise InputError(f"depth {spec}: expected an existing folder of depth maps, or `plane`")
+    return FolderDepth(spec, reference_paths, scale)

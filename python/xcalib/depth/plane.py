@@ -1,0 +1,50 @@
+"""Depth from a prior on the road."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..frames import Image, InputError, size_of
+from .provider import Depth
+
+
+@dataclass(frozen=True)
+class PlaneDepth:
+    """Road-plane prior: a flat road under a level camera, and everything else far away.
+
+    ``D(y) = camera_height * fy / (y - horizon row)``, never beyond ``far``, which is also the
+    depth at and above the horizon.
+    """
+
+    camera_height: float = 1.6
+    """Height of the reference camera above the road [m], > 0."""
+    horizon: float = 0.5
+    """Row of the horizon as a fraction of the image height from the top, (-1, 1)."""
+    far: float = 60.0
+    """Largest depth [m], > 0."""
+    hfov_deg: float = 45.0
+    """Horizontal field of view of the reference camera [deg], (0, 180); pixels are square."""
+
+    def __post_init__(self) -> None:
+        for name, low, high, unit in (
+            ("camera_height", 0.0, math.inf, "m"),
+            ("horizon", -1.0, 1.0, "of the image height"),
+            ("far", 0.0, math.inf, "m"),
+            ("hfov_deg", 0.0, 180.0, "deg"),
+        ):
+            value = getattr(self, name)
+            if not low < value < high:  # NaN fails too
+                between = f"above {low:g}" if high == math.inf else f"between {low:g} and {high:g}"
+                raise InputError(f"plane {name} is {value:g}, expected {between} {unit}")
+
+    def __call__(self, index: int, reference: Image) -> Depth:
+        width, height = size_of(reference)
+        fy = 0.5 * width / math.tan(math.radians(self.hfov_deg) / 2)
+        below = np.arange(height) - (self.horizon * height - 0.5)  # rows below the horizon [px]
+        depth = np.full(height, self.far)
+        road = below > 0
+        depth[road] = np.minimum(self.camera_height * fy / below[road], self.far)
+        return np.repeat(depth.astype(np.float32)[:, None], width, axis=1)
