@@ -71,7 +71,7 @@ double median_distance(const Level& level, const Rig& a, const Rig& b) {
 
 void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
            CalibrationReport& report) {
-    constexpr double kDetail = 0.9, kContrast = 6.0, kRepeatability = 1.0, kShare = 0.05;
+    constexpr double kDetail = 0.5, kContrast = 5.0, kRepeatability = 1.0, kShare = 0.05;
     const Level level = make_level(images, kFactor, rig, options.num_threads);
     const double here = pooled(level, rig, options.num_threads).nec;
     const Baseline baseline = displaced(level, rig, options.num_threads);
@@ -91,9 +91,12 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
     }
 
     // Where the fit is some pixels off, coarse edges still meet and fine ones do not.
-    const double coarse_nec =
-        pooled(make_nec_level(images, kCoarse, rig, options.num_threads), rig, options.num_threads)
-            .nec;
+    const auto aligned_at = [&](int factor) {
+        return pooled(make_nec_level(images, factor, rig, options.num_threads), rig,
+                      options.num_threads)
+            .aligned;
+    };
+    const double coarse = aligned_at(kCoarse), fine = aligned_at(1);
 
     report.converged = false;
     if (pairs < 2) report.message = "1 image pair is too few to trust, expected at least 2";
@@ -107,11 +110,12 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
             "edges agree hardly better than displaced ones: NEC stands out by "
             "%.1f deviations, expected at least %.0f",
             report.contrast, kContrast);
-    else if (report.nec < kDetail * coarse_nec)
+    else if (fine < kDetail * coarse)
         report.message = format(
-            "only coarse edges agree: NEC falls from %.3f at 1/%d of the size to %.3f, expected at "
-            "least %.3f",
-            coarse_nec, kCoarse, report.nec, kDetail * coarse_nec);
+            "only coarse edges agree: beyond chance %.3f at 1/%d of the size and %.3f at full "
+            "size, "
+            "expected at least %.3f",
+            coarse, kCoarse, fine, kDetail * coarse);
     else if (report.repeatability_px > kRepeatability)
         report.message = format(
             "two halves of the frames disagree by %.2f px, expected at most "
