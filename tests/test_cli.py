@@ -365,8 +365,8 @@ def test_constant_images(scene: Path, refused: Refused, kind: str) -> None:
 
 def test_an_unknown_depth_spec_says_what_is_accepted(scene: Path, refused: Refused) -> None:
     visible, thermal, out = scene / "visible", scene / "thermal", scene / "rig.yaml"
-    line = refused("calibrate", visible, thermal, "--depth", "model.onnx", "-o", out)
-    assert "model.onnx" in line and "`plane`" in line
+    line = refused("calibrate", visible, thermal, "--depth", "model.pt", "-o", out)
+    assert "model.pt" in line and "`plane`" in line
 
 
 @pytest.mark.parametrize(

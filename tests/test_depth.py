@@ -84,9 +84,12 @@ def test_wrong_aspect_is_named(tmp_path: Path) -> None:
         depth(0, REFERENCE)
 
 
-@pytest.mark.parametrize("spec", ["nothing", "model.onnx"])
-def test_only_folders_and_plane_are_depth(spec: str) -> None:
-    with pytest.raises(InputError, match=f"depth {spec}: expected an existing folder"):
+@pytest.mark.parametrize(
+    ("spec", "problem"),
+    [("nothing", "expected an existing folder"), ("model.onnx", "no such file")],
+)
+def test_only_folders_networks_and_plane_are_depth(spec: str, problem: str) -> None:
+    with pytest.raises(InputError, match=f"depth {spec}: {problem}"):
         open_depth(spec, [Path("v/1.png")])
 
 

@@ -31,6 +31,7 @@ from .frames import (
     write_bytes,
 )
 from .inspection import as_lines, describe
+from .models_command import models
 from .pipeline import Frames, progress, run_calibration, run_registration, save_rig
 
 FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
@@ -119,7 +120,7 @@ frames_arguments = options(
         metavar="DEPTH",
         required=True,
         help="Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr in m;"
-        " 0 unknown), or `plane` for a flat road.",
+        " 0 unknown), an .onnx file of a network, or `plane` for a flat road.",
     ),
     number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256"),
     number(
@@ -140,6 +141,34 @@ frames_arguments = options(
         "DEG",
         PlaneDepth.hfov_deg,
         "Plane: horizontal field of view of the reference camera [deg].",
+    ),
+    click.option(
+        "--depth-recipe",
+        metavar="NAME",
+        help="Network: what it expects and returns, a name of `xcalib models list`.  [default: the"
+        " .yaml file beside it, or by its name]",
+    ),
+    click.option(
+        "--depth-focal",
+        metavar="PX",
+        type=float,
+        help="Network: focal length of the reference camera [px], for those whose depth scales"
+        " with it.",
+    ),
+    click.option(
+        "--inverse-scale",
+        metavar="A",
+        type=float,
+        help="Network: depth is 1 / (A r + B) of its output r.  [default: the recipe's; for"
+        " relative depth a guess without metric scale]",
+    ),
+    click.option("--inverse-shift", metavar="B", type=float, help="Network: see --inverse-scale."),
+    click.option(
+        "--providers",
+        metavar="NAMES",
+        default="cpu",
+        show_default=True,
+        help="Network: execution providers, the preferred first: cuda,cpu.",
     ),
 )
 quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
@@ -293,7 +322,7 @@ def calibrate_command(
             calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
 
     initial_rig = Rig.load(initial) if initial else None
-    frames = Frames.open(**inputs)
+    frames = Frames.open(threads=threads, **inputs)
     check_file_writable(output)
     if report_file:
         check_file_writable(report_file)
@@ -350,7 +379,7 @@ def register_command(
     Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
     """
     rig = Rig.load(rig_file)
-    frames = Frames.open(**inputs)
+    frames = Frames.open(threads=threads, **inputs)
     for name in ("reference", "source", "depth_spec"):
         if Path(inputs[name]).resolve() == output.resolve():
             raise InputError(f"output folder {output} is an input folder, expected another")
@@ -389,7 +418,7 @@ def evaluate_command(
 ) -> None:
     """Score the registered SOURCE against REFERENCE, beside the source that is only resized."""
     rig = Rig.load(rig_file)
-    frames = Frames.open(**inputs)
+    frames = Frames.open(threads=threads, **inputs)
     if json_file:
         check_file_writable(json_file)
     # Depth wants the reference image too: tee hands it on, so that it is read once.
@@ -514,6 +543,9 @@ def short(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(short, value))
     return f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
+
+
+cli.add_command(models)
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, calibrate, choose_frames
-from .depth import PNG_SCALE, DepthProvider, PlaneDepth, open_depth
+from .depth import PNG_SCALE, DepthProvider, NetworkOptions, PlaneDepth, open_depth
 from .frames import Image, Images, InputError, fit_rig, open_pairs, overlay, size_of, write_image
 
 T = TypeVar("T")
@@ -49,13 +49,26 @@ class Frames:
         horizon: float = PlaneDepth.horizon,
         far: float = PlaneDepth.far,
         plane_hfov: float = PlaneDepth.hfov_deg,
+        depth_recipe: str | None = None,
+        depth_focal: float | None = None,
+        inverse_scale: float | None = None,
+        inverse_shift: float | None = None,
+        providers: str = "cpu",
+        threads: int = 0,
     ) -> Frames:
         """Open frames as the arguments of the commands name them."""
         references, sources = open_pairs(reference, source)
         plane = PlaneDepth(camera_height, horizon, far, plane_hfov)
-        return Frames(
-            references, sources, open_depth(depth_spec, references.paths, depth_scale, plane)
+        network = NetworkOptions(
+            depth_recipe,
+            depth_focal,
+            inverse_scale,
+            inverse_shift,
+            tuple(name.strip() for name in providers.split(",")),
+            threads,
         )
+        depth = open_depth(depth_spec, references.paths, depth_scale, plane, network)
+        return Frames(references, sources, depth)
 
     def __len__(self) -> int:
         return len(self.references)

@@ -1,4 +1,4 @@
-"""Depth of the reference frames: from files, or from a prior on the road.
+"""Depth of the reference frames: from files, from a network, or from a prior on the road.
 
 A provider is called with the index of a frame and its reference image and returns the depth map
 ``(h, w)`` float32 in metres along the optical axis, 0 where unknown. Its size is free, its aspect
@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ..frames import InputError
 from .files import DEPTH_SUFFIXES, PNG_SCALE, FolderDepth, read_depth
+from .network import NetworkDepth, NetworkOptions
 from .plane import PlaneDepth
 from .provider import Depth, DepthProvider
 
@@ -21,6 +22,8 @@ __all__ = [
     "Depth",
     "DepthProvider",
     "FolderDepth",
+    "NetworkDepth",
+    "NetworkOptions",
     "PlaneDepth",
     "open_depth",
     "read_depth",
@@ -32,22 +35,30 @@ def open_depth(
     reference_paths: Sequence[Path],
     scale: float = PNG_SCALE,
     plane: PlaneDepth | None = None,
+    network: NetworkOptions | None = None,
 ) -> DepthProvider:
     """The depth provider that a ``--depth`` argument names.
 
     Parameters
     ----------
     spec
-        A folder of depth maps, or the word ``plane`` (a folder of that name: ``./plane``).
+        A folder of depth maps, the .onnx file of a network, or the word ``plane`` (a folder of
+        that name: ``./plane``).
     reference_paths
         Files of the reference images, in the order of the frames.
     scale
         Metres per count of 16-bit PNG depth.
     plane
         The prior used for ``plane``.
+    network
+        How to run a network.
     """
     if str(spec) == "plane":
         return plane or PlaneDepth()
+    if Path(spec).suffix.lower() == ".onnx" and not Path(spec).is_dir():
+        return NetworkDepth(spec, network)
     if not Path(spec).is_dir():
-        raise InputError(f"depth {spec}: expected an existing folder of depth maps, or `plane`")
+        raise InputError(
+            f"depth {spec}: expected an existing folder of depth maps, an .onnx file, or `plane`"
+        )
     return FolderDepth(spec, reference_paths, scale)
