@@ -22,6 +22,7 @@ from ._core import CalibrationOptions, Pinhole, Rig
 from .demo import run_demo
 from .depth import PNG_SCALE, PlaneDepth
 from .evaluate import evaluate
+from .footage import METHODS, is_video
 from .frames import (
     Image,
     InputError,
@@ -90,6 +91,19 @@ def intrinsics(
     return fx, fy, cx, cy
 
 
+def clock_offset(ctx: click.Context, param: click.Parameter, value: str) -> float | None:
+    """Parse ``auto`` or seconds."""
+    if value == "auto":
+        return None
+    try:
+        seconds = float(value)
+    except ValueError:
+        seconds = math.nan
+    if not math.isfinite(seconds):
+        raise click.BadParameter(f"{value!r} is neither `auto` nor a number of seconds")
+    return seconds
+
+
 def options(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:
     """Several click decorators as one."""
 
@@ -142,6 +156,50 @@ frames_arguments = options(
         "Plane: horizontal field of view of the reference camera [deg].",
     ),
 )
+frames_arguments = options(
+    frames_arguments,
+    click.option(
+        "--pair",
+        "pairing",
+        type=click.Choice(METHODS),
+        default="auto",
+        show_default=True,
+        help="Pair frames by name, order or time; auto: by time where both have times.",
+    ),
+    click.option(
+        "--time-offset",
+        metavar="S",
+        default="0",
+        show_default=True,
+        callback=clock_offset,
+        help="By how much the source's clock is late [s], or `auto`, from the footage.",
+    ),
+    click.option(
+        "--max-gap",
+        metavar="S",
+        type=click.FloatRange(0, min_open=True),
+        help="Largest distance in time of a pair [s].  [default: half the slower one's period]",
+    ),
+    *(
+        click.option(
+            f"--{name}-times",
+            metavar="FILE",
+            type=click.Path(path_type=Path),
+            help=f"Times of the {name} frames: lines `name timestamp`.  [default: their own]",
+        )
+        for name in ("reference", "source")
+    ),
+)
+
+
+def open_frames(inputs: dict[str, Any]) -> Frames:
+    """Open what `frames_arguments` names, and say how frames were paired by time."""
+    frames = Frames.open(**inputs)
+    for note in frames.notes:
+        click.echo(note, err=True)
+    return frames
+
+
 quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
 threads_option = click.option(
     "--threads",
@@ -158,7 +216,9 @@ rig_argument = click.argument("rig_file", metavar="RIG", type=click.Path(path_ty
 def cli() -> None:
     """Calibrate a fixed pair of cameras, visible and thermal, and register their frames.
 
-    REFERENCE and SOURCE are folders of images (8 or 16 bit, any size), paired by name.
+    REFERENCE and SOURCE are folders or patterns of images (8 or 16 bit, any size), videos, or
+    bags with a topic (drive.mcap#/camera/image_raw); #left, #right, #top or #bottom behind one
+    takes half of each frame.
 
     Exit codes: 0 done and trusted, 1 failed, 2 wrong usage or input, 3 done, but the result is
     not to be trusted.
@@ -293,7 +353,7 @@ def calibrate_command(
             calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
 
     initial_rig = Rig.load(initial) if initial else None
-    frames = Frames.open(**inputs)
+    frames = open_frames(inputs)
     check_file_writable(output)
     if report_file:
         check_file_writable(report_file)
@@ -303,7 +363,7 @@ def calibrate_command(
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")
     if report_file:
-        files = [str(frames.references.paths[index]) for index in chosen]
+        files = [frames.references.where(index) for index in chosen]
         document = {"format": "xcalib-report", "version": 1, "rig": str(output), "files": files}
         write_json(report_file, document | result.report.to_dict())
         click.echo(f"report: {report_file}")
@@ -337,7 +397,8 @@ def finite(value: Any) -> Any:
     metavar="OUT",
     type=click.Path(path_type=Path),
     required=True,
-    help="Folder to write to: images under the reference's names, and masks/.",
+    help="Folder to write to: images under the reference's names, and masks/. Or a video: .mp4,"
+    " .avi (8 bit), .mkv (without loss, gray also 16 bit), and its masks.",
 )
 @click.option("--overlay", "overlays", is_flag=True, help="Also write red-cyan overlays/.")
 @threads_option
@@ -350,11 +411,11 @@ def register_command(
     Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
     """
     rig = Rig.load(rig_file)
-    frames = Frames.open(**inputs)
+    frames = open_frames(inputs)
     for name in ("reference", "source", "depth_spec"):
         if Path(inputs[name]).resolve() == output.resolve():
             raise InputError(f"output folder {output} is an input folder, expected another")
-    check_folder_writable(output)
+    (check_file_writable if is_video(output) else check_folder_writable)(output)
     total = run_registration(frames, rig, output, threads, overlays, quiet)
     click.echo(f"{total.summary()}: {output}")
     if not total.valid:
@@ -389,7 +450,7 @@ def evaluate_command(
 ) -> None:
     """Score the registered SOURCE against REFERENCE, beside the source that is only resized."""
     rig = Rig.load(rig_file)
-    frames = Frames.open(**inputs)
+    frames = open_frames(inputs)
     if json_file:
         check_file_writable(json_file)
     # Depth wants the reference image too: tee hands it on, so that it is read once.
@@ -404,7 +465,7 @@ def evaluate_command(
     )
     click.echo(result.table())
     if json_file:
-        names = [path.name for path in frames.references.paths]
+        names = [frames.references.where(index) for index in range(len(frames))]
         write_json(json_file, {"rig": str(rig_file), "files": names} | result.to_dict())
     if not result.valid_share:
         stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")
