@@ -22,7 +22,7 @@ from ._core import CalibrationOptions, Pinhole, Rig
 from .demo import run_demo
 from .depth import PNG_SCALE, PlaneDepth
 from .evaluate import evaluate
-from .footage import METHODS, is_video
+from .footage import METHODS, camera_infos, is_bag, is_video
 from .frames import (
     Image,
     InputError,
@@ -527,7 +527,11 @@ def demo_command(
 @rig_argument
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def inspect_command(rig_file: Path, as_json: bool) -> None:
-    """Print what a rig file says, in units one can picture."""
+    """Print what a rig file says, in units one can picture; of a bag, what its cameras say."""
+    if is_bag(rig_file):
+        for info in camera_infos(rig_file):
+            click.echo(info.line())
+        return
     facts = describe(Rig.load(rig_file))
     if as_json:
         click.echo(json.dumps(finite(facts), indent=2))

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from .bag import BagImages, CameraInfo, camera_infos
+from .bag import BagImages, CameraInfo, camera_infos, is_bag
 from .files import ImageFiles, Pages
 from .offset import OffsetEstimate, estimate_offset, refine_offset
 from .opening import Matching, Pairs, open_pairs
@@ -36,6 +36,7 @@ __all__ = [
     "Video",
     "camera_infos",
     "estimate_offset",
+    "is_bag",
     "is_video",
     "match_depths",
     "open_pairs",

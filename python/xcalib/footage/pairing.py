@@ -153,7 +153,8 @@ def match_depths(
     """The depth file of each reference frame in use: indices into ``depths``.
 
     Files under the names of the frames are theirs, and others are left over. Else the nearest in
-    time, where both tell it; else by `frames.pair`, of all reference frames or of those in use.
+    time within half a period of the references, where both tell it; else by `frames.pair`, of all
+    reference frames or of those in use.
     """
     own = {path.stem: index for index, path in enumerate(depths)}
     names = [references.name(int(index)) for index in used]
@@ -162,7 +163,7 @@ def match_depths(
     timed = ImageFiles(depths)
     if references.times is not None and timed.times is not None:
         times = references.times[used]
-        found = pair_times(times, timed.times)
+        found = pair_times(times, timed.times, 0.0, median_period(references.times) / 2 or None)
         if len(found.references) < len(times):
             lost = sorted(set(range(len(times))) - set(found.references.tolist()))[0]
             raise InputError(
