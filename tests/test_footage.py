@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -166,6 +167,29 @@ def test_truncated_video(tmp_path: Path, name: str, codec: str) -> None:
         open_stream(path)
 
 
+def test_a_seek_that_leads_astray_is_not_believed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Astray:
+        def __init__(self, *arguments: Any) -> None:
+            self.capture = capture(*arguments)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.capture, name)
+
+        def set(self, key: int, value: float) -> bool:
+            off = 3 if key == cv2.CAP_PROP_POS_FRAMES else 0
+            return bool(self.capture.set(key, value + off))
+
+    capture = cv2.VideoCapture
+    frames = moving(90)
+    path = write_video(tmp_path / "a.mkv", frames, "FFV1")
+    monkeypatch.setattr(cv2, "VideoCapture", Astray)
+    video = open_stream(path)
+    for index in (80, 2, 79):
+        np.testing.assert_array_equal(video[index], frames[index])
+
+
 def test_halves(tmp_path: Path) -> None:
     frames = moving(3)
     path = write_video(tmp_path / "w.mkv", frames, "FFV1")
@@ -288,6 +312,18 @@ def test_bags(tmp_path: Path, kind: str) -> None:
     result = run("inspect", bag)
     assert result.exit_code == 0, result.output
     assert "FX,FY,CX,CY 300,301,160,120 px" in result.stdout
+
+
+def test_bags_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    with pytest.raises(InputError, match=r"a\.mcap: bags need .* install xcalib-rgbt\[ros\]"):
+        open_stream(f"{tmp_path / 'a.mcap'}#/x")
+
+
+def test_a_folder_of_images_may_hold_metadata(tmp_path: Path) -> None:
+    write_image(tmp_path / "1.png", moving(1)[0])
+    (tmp_path / "metadata.yaml").write_text("camera: thermal\n")
+    assert len(open_stream(tmp_path)) == 1
 
 
 def test_bad_bags(tmp_path: Path) -> None:

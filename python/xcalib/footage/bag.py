@@ -48,7 +48,10 @@ ENCODINGS: dict[str, tuple[type[np.generic], int, int | None]] = {
 
 def is_bag(path: Path) -> bool:
     """Whether the path is a bag: a file of its suffixes, or a ROS 2 folder."""
-    return path.suffix.lower() in BAG_SUFFIXES or (path / "metadata.yaml").is_file()
+    if path.suffix.lower() in BAG_SUFFIXES:
+        return True
+    metadata = path / "metadata.yaml"  # a name that folders of images may use too
+    return metadata.is_file() and b"rosbag2_bagfile_information" in metadata.read_bytes()
 
 
 class BagImages(Stream):

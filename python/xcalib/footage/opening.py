@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..depth import DEPTH_SUFFIXES, PNG_SCALE, Depth, DepthProvider, PlaneDepth, open_depth
 from ..frames import Image, InputError, list_files
@@ -76,7 +77,7 @@ class Pairs:
         return PickedDepth(open_depth(spec, files, scale, plane), matched)
 
 
-def _picked(stream: Stream, indices: np.typing.NDArray[np.intp]) -> Stream:
+def _picked(stream: Stream, indices: NDArray[np.intp]) -> Stream:
     chosen = indices.tolist()
     return stream if chosen == list(range(len(stream))) else Picked(stream, chosen)
 
