@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from conftest import FRAMES, run
-from xcalib import Rig, synthetic
+from xcalib import Pinhole, Rig, synthetic
 from xcalib.depth import read_depth
 from xcalib.footage import (
     Stream,
@@ -475,7 +475,7 @@ def pans(late: float, rate: float = 30, moves: bool = True) -> tuple[Stream, Str
     return visible, Pan(THERMAL, np.arange(0.01, 7, 1 / rate), late, moves, 6, 1)
 
 
-@pytest.mark.parametrize("late", [0.0, 10 / 30, -0.2, 0.047])
+@pytest.mark.parametrize("late", [10 / 30, -0.2, 0.047])
 def test_clock_offset_to_a_fraction_of_a_frame(late: float) -> None:
     estimate = estimate_offset(*pans(late))
     assert estimate.trusted
@@ -596,6 +596,29 @@ def test_late_source_is_paired_with_its_scene(rendered: Path, tmp_path: Path) ->
     assert run("register", rig, *inputs, "-o", tmp_path / "true").exit_code == 0
     for path in list_files(out):
         np.testing.assert_array_equal(read_image(path), read_image(tmp_path / "true" / path.name))
+
+
+def test_register_estimates_how_late_the_source_is(tmp_path: Path) -> None:
+    """Both containers start at zero; the source shows ten frames later what happened."""
+    times = np.arange(150) / 30
+    scenes = {
+        "v": Pan(VISIBLE, times, 0, True, 3, 0),
+        "t": Pan(THERMAL, times - 1 / 3, 0, True, 6, 1),
+    }
+    v, t = (
+        write_video(tmp_path / f"{name}.mkv", list(pan), "FFV1", 30) for name, pan in scenes.items()
+    )
+    camera = Pinhole(240, 160, 200, 200, 119.5, 79.5)
+    Rig(camera, camera).save(tmp_path / "rig.yaml")
+    arguments = ("register", tmp_path / "rig.yaml", v, t, "--depth", "plane")
+    result = run(*arguments, "--time-offset", "auto", "-o", tmp_path / "out.mkv")
+    assert result.exit_code == 0, result.output
+    found = re.search(r"clock offset: source late by ([+0-9.]+) s", result.stderr)
+    assert found and float(found[1]) == pytest.approx(1 / 3, abs=0.008)
+    assert "140 pairs by time" in result.stderr
+    assert "10 reference, 10 source frames" in result.stderr
+    # The rig is the identity: what is registered first is the source's eleventh frame.
+    np.testing.assert_array_equal(open_stream(tmp_path / "out.mkv")[0], open_stream(t)[10])
 
 
 def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> None:

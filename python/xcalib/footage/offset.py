@@ -27,7 +27,7 @@ WIDTH = 160
 """Width at which edges are taken [px]."""
 MIN_CORRELATION = 0.2
 """Of a peak that tells."""
-MIN_CONTRAST = 0.08
+MIN_CONTRAST = 0.12
 """What a peak that tells stands above every other [correlation]."""
 
 Array = NDArray[np.float64]
