@@ -527,7 +527,8 @@ def filmed(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_calibrate_two_videos(filmed: Path, rendered: Path, tmp_path: Path) -> None:
     visible, thermal, out = filmed / "visible.mkv", filmed / "thermal.mkv", tmp_path / "rig.yaml"
-    result = run("calibrate", visible, thermal, "--depth", rendered / "depth", "-o", out)
+    inputs = ("--depth", rendered / "depth", "--working-width", 160)
+    result = run("calibrate", visible, thermal, *inputs, "-o", out)
     assert result.exit_code == 0, result.output
     assert f"{FRAMES} pairs by time" in result.stderr
     depth = read_depth(list_files(rendered / "depth")[0])
