@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from xcalib import Pinhole, Rig
+from xcalib.footage import ImageFiles
 from xcalib.frames import (
     Image,
-    Images,
     InputError,
     check_file_writable,
     check_folder_writable,
@@ -190,7 +190,7 @@ def test_jpeg_with_thumbnail_is_truncated_only_if_its_own_end_is_missing(tmp_pat
 def test_images_of_a_folder_have_one_size(tmp_path: Path) -> None:
     write_image(tmp_path / "1.png", noise(5, 7))
     write_image(tmp_path / "2.png", noise(5, 8))
-    images = Images(list_files(tmp_path))
+    images = ImageFiles(list_files(tmp_path))
     assert images[0].shape == (5, 7)
     with pytest.raises(InputError, match=r"2\.png is 8x5, expected 7x5 as 1\.png"):
         images[1]

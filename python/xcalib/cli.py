@@ -22,6 +22,7 @@ from ._core import CalibrationOptions, Pinhole, Rig
 from .demo import run_demo
 from .depth import PNG_SCALE, PlaneDepth
 from .evaluate import evaluate
+from .footage import METHODS, camera_infos, is_bag, is_video
 from .frames import (
     Image,
     InputError,
@@ -89,6 +90,19 @@ def intrinsics(
     if not (fx > 0 and fy > 0 and all(map(math.isfinite, (fx, fy, cx, cy)))):
         raise click.BadParameter(f"{value!r}: expected finite numbers, FX and FY above 0 px")
     return fx, fy, cx, cy
+
+
+def clock_offset(ctx: click.Context, param: click.Parameter, value: str) -> float | None:
+    """Parse ``auto`` or seconds."""
+    if value == "auto":
+        return None
+    try:
+        seconds = float(value)
+    except ValueError:
+        seconds = math.nan
+    if not math.isfinite(seconds):
+        raise click.BadParameter(f"{value!r} is neither `auto` nor a number of seconds")
+    return seconds
 
 
 def options(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:
@@ -171,6 +185,50 @@ frames_arguments = options(
         help="Network: execution providers, the preferred first: cuda,cpu.",
     ),
 )
+frames_arguments = options(
+    frames_arguments,
+    click.option(
+        "--pair",
+        "pairing",
+        type=click.Choice(METHODS),
+        default="auto",
+        show_default=True,
+        help="Pair frames by name, order or time; auto: by time where both have times.",
+    ),
+    click.option(
+        "--time-offset",
+        metavar="S",
+        default="0",
+        show_default=True,
+        callback=clock_offset,
+        help="By how much the source's clock is late [s], or `auto`, from the footage.",
+    ),
+    click.option(
+        "--max-gap",
+        metavar="S",
+        type=click.FloatRange(0, min_open=True),
+        help="Largest distance in time of a pair [s].  [default: half the slower one's period]",
+    ),
+    *(
+        click.option(
+            f"--{name}-times",
+            metavar="FILE",
+            type=click.Path(path_type=Path),
+            help=f"Times of the {name} frames: lines `name timestamp`.  [default: their own]",
+        )
+        for name in ("reference", "source")
+    ),
+)
+
+
+def open_frames(inputs: dict[str, Any], threads: int) -> Frames:
+    """Open what `frames_arguments` names, and say how frames were paired by time."""
+    frames = Frames.open(threads=threads, **inputs)
+    for note in frames.notes:
+        click.echo(note, err=True)
+    return frames
+
+
 quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
 threads_option = click.option(
     "--threads",
@@ -187,7 +245,9 @@ rig_argument = click.argument("rig_file", metavar="RIG", type=click.Path(path_ty
 def cli() -> None:
     """Calibrate a fixed pair of cameras, visible and thermal, and register their frames.
 
-    REFERENCE and SOURCE are folders of images (8 or 16 bit, any size), paired by name.
+    REFERENCE and SOURCE are folders or patterns of images (8 or 16 bit, any size), videos, or
+    bags with a topic (drive.mcap#/camera/image_raw); #left, #right, #top or #bottom behind one
+    takes half of each frame.
 
     Exit codes: 0 done and trusted, 1 failed, 2 wrong usage or input, 3 done, but the result is
     not to be trusted.
@@ -322,7 +382,7 @@ def calibrate_command(
             calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
 
     initial_rig = Rig.load(initial) if initial else None
-    frames = Frames.open(threads=threads, **inputs)
+    frames = open_frames(inputs, threads)
     check_file_writable(output)
     if report_file:
         check_file_writable(report_file)
@@ -332,7 +392,7 @@ def calibrate_command(
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")
     if report_file:
-        files = [str(frames.references.paths[index]) for index in chosen]
+        files = [frames.references.where(index) for index in chosen]
         document = {"format": "xcalib-report", "version": 1, "rig": str(output), "files": files}
         write_json(report_file, document | result.report.to_dict())
         click.echo(f"report: {report_file}")
@@ -366,7 +426,8 @@ def finite(value: Any) -> Any:
     metavar="OUT",
     type=click.Path(path_type=Path),
     required=True,
-    help="Folder to write to: images under the reference's names, and masks/.",
+    help="Folder to write to: images under the reference's names, and masks/. Or a video: .mp4,"
+    " .avi (8 bit), .mkv (without loss, gray also 16 bit), and its masks.",
 )
 @click.option("--overlay", "overlays", is_flag=True, help="Also write red-cyan overlays/.")
 @threads_option
@@ -379,11 +440,11 @@ def register_command(
     Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
     """
     rig = Rig.load(rig_file)
-    frames = Frames.open(threads=threads, **inputs)
+    frames = open_frames(inputs, threads)
     for name in ("reference", "source", "depth_spec"):
         if Path(inputs[name]).resolve() == output.resolve():
             raise InputError(f"output folder {output} is an input folder, expected another")
-    check_folder_writable(output)
+    (check_file_writable if is_video(output) else check_folder_writable)(output)
     total = run_registration(frames, rig, output, threads, overlays, quiet)
     click.echo(f"{total.summary()}: {output}")
     if not total.valid:
@@ -418,7 +479,7 @@ def evaluate_command(
 ) -> None:
     """Score the registered SOURCE against REFERENCE, beside the source that is only resized."""
     rig = Rig.load(rig_file)
-    frames = Frames.open(threads=threads, **inputs)
+    frames = open_frames(inputs, threads)
     if json_file:
         check_file_writable(json_file)
     # Depth wants the reference image too: tee hands it on, so that it is read once.
@@ -433,7 +494,7 @@ def evaluate_command(
     )
     click.echo(result.table())
     if json_file:
-        names = [path.name for path in frames.references.paths]
+        names = [frames.references.where(index) for index in range(len(frames))]
         write_json(json_file, {"rig": str(rig_file), "files": names} | result.to_dict())
     if not result.valid_share:
         stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")
@@ -495,7 +556,11 @@ def demo_command(
 @rig_argument
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def inspect_command(rig_file: Path, as_json: bool) -> None:
-    """Print what a rig file says, in units one can picture."""
+    """Print what a rig file says, in units one can picture; of a bag, what its cameras say."""
+    if is_bag(rig_file):
+        for info in camera_infos(rig_file):
+            click.echo(info.line())
+        return
     facts = describe(Rig.load(rig_file))
     if as_json:
         click.echo(json.dumps(finite(facts), indent=2))

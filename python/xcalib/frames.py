@@ -1,6 +1,6 @@
-"""Frames on disk: folders of images in, whole image files out.
+"""Images on disk: files of a folder, their pairs, image files in, whole image files out.
 
-A folder of images is a stream of frames. Files are taken in *natural* order of their names
+Files are taken in *natural* order of their names
 (``2.png`` before ``10.png``); hidden files and files of other types are ignored. Images are numpy
 arrays ``(H, W)`` or ``(H, W, 3)`` of ``uint8``, ``uint16`` or ``float32`` in the file's own range;
 colour is in OpenCV's order, blue-green-red, and an alpha channel is dropped.
@@ -13,9 +13,9 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Callable, Collection, Hashable, Iterator, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import cv2
 import numpy as np
@@ -177,46 +177,6 @@ def _is_truncated(data: bytes) -> bool:
 def size_of(image: Image) -> Size:
     """Width and height [px] of an image or a depth map."""
     return image.shape[1], image.shape[0]
-
-
-class Images(Sequence[Image]):
-    """The images of a list of files, read at the moment of access, all of one size."""
-
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.paths = list(paths)
-        self._first: tuple[Path, Size] | None = None
-
-    def __len__(self) -> int:
-        return len(self.paths)
-
-    @overload
-    def __getitem__(self, index: int) -> Image: ...
-    @overload
-    def __getitem__(self, index: slice) -> Images: ...
-    def __getitem__(self, index: int | slice) -> Image | Images:
-        if isinstance(index, slice):
-            return Images(self.paths[index])
-        path = self.paths[index]
-        image = read_image(path)
-        size = size_of(image)
-        if self._first is None:
-            self._first = path, size
-        first, expected = self._first
-        if size != expected:
-            raise InputError(
-                f"{path} is {size[0]}x{size[1]}, expected {expected[0]}x{expected[1]}"
-                f" as {first.name}"
-            )
-        return image
-
-    def __iter__(self) -> Iterator[Image]:
-        return (self[index] for index in range(len(self)))
-
-
-def open_pairs(reference: str | Path, source: str | Path) -> tuple[Images, Images]:
-    """The two cameras' folders as two equally long sequences of images, paired by `pair`."""
-    pairs = pair(list_files(reference), list_files(source))
-    return Images([first for first, _ in pairs]), Images([second for _, second in pairs])
 
 
 # -- Sizes ---------------------------------------------------------------------------------------

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, calibrate, choose_frames
-from .depth import PNG_SCALE, DepthProvider, NetworkOptions, PlaneDepth, open_depth
-from .frames import Image, Images, InputError, fit_rig, open_pairs, overlay, size_of, write_image
+from .depth import PNG_SCALE, DepthProvider, NetworkOptions, PlaneDepth
+from .footage import Matching, Stream, open_pairs, open_sink
+from .footage.pairing import median_period
+from .frames import Image, InputError, fit_rig, overlay, size_of
 
 T = TypeVar("T")
 
@@ -33,11 +35,13 @@ def progress(items: Iterable[T], total: int, what: str, quiet: bool = False) -> 
 
 @dataclass(frozen=True)
 class Frames:
-    """Paired frames on disk, opened but not read."""
+    """Paired frames, opened but not read."""
 
-    references: Images
-    sources: Images
+    references: Stream
+    sources: Stream
     depth: DepthProvider
+    notes: tuple[str, ...] = ()
+    """What the pairing by time found, a line each."""
 
     @staticmethod
     def open(
@@ -55,9 +59,15 @@ class Frames:
         inverse_shift: float | None = None,
         providers: str = "cpu",
         threads: int = 0,
+        pairing: str = Matching.method,
+        time_offset: float | None = Matching.time_offset,
+        max_gap: float | None = Matching.max_gap,
+        reference_times: Path | None = None,
+        source_times: Path | None = None,
     ) -> Frames:
         """Open frames as the arguments of the commands name them."""
-        references, sources = open_pairs(reference, source)
+        matching = Matching(pairing, time_offset, max_gap, reference_times, source_times)
+        pairs = open_pairs(reference, source, matching)
         plane = PlaneDepth(camera_height, horizon, far, plane_hfov)
         network = NetworkOptions(
             depth_recipe,
@@ -67,8 +77,8 @@ class Frames:
             tuple(name.strip() for name in providers.split(",")),
             threads,
         )
-        depth = open_depth(depth_spec, references.paths, depth_scale, plane, network)
-        return Frames(references, sources, depth)
+        depth = pairs.open_depth(depth_spec, depth_scale, plane, network)
+        return Frames(pairs.references, pairs.sources, depth, pairs.notes)
 
     def __len__(self) -> int:
         return len(self.references)
@@ -120,12 +130,12 @@ def run_calibration(
     return result, chosen
 
 
-def _with_file_name(message: str, images: Images, chosen: Sequence[int]) -> str:
+def _with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str:
     """The message with the file that the core, which sees arrays only, calls ``frame N``."""
     found = re.search(r"\bframe (\d+)\b", message)
     if not found or int(found[1]) >= len(chosen):
         return message
-    return f"{message} (frame {found[1]} is {images.paths[chosen[int(found[1])]]})"
+    return f"{message} (frame {found[1]} is {images.where(chosen[int(found[1])])})"
 
 
 def save_rig(rig: Rig, path: Path) -> None:
@@ -150,30 +160,35 @@ class Registration:
         return f"{self.frames} frames, {share:.1f} % valid, {speed:.1f} frames/s with files"
 
 
+def frame_rate(stream: Stream) -> float:
+    """Frames a second, by the median; 25 where the stream does not tell."""
+    period = 0.0 if stream.times is None else median_period(stream.times)
+    return 1 / period if period else 25.0
+
+
 def run_registration(
     frames: Frames,
     rig: Rig,
-    folder: Path,
+    output: Path,
     threads: int = 0,
     overlays: bool = False,
     quiet: bool = False,
 ) -> Registration:
-    """Register frame by frame and write images, masks and, if asked for, overlays."""
+    """Register frame by frame and write images, masks and, if asked for, overlays.
+
+    ``output`` is a folder, or a video by its suffix, at the rate of the reference.
+    """
     registrar = Registrar(frames.fit(rig), threads)
     total = Registration()
     start = time.perf_counter()
-    for index in progress(range(len(frames)), len(frames), "registering", quiet):
-        reference, source, depth = frames.read(index)
-        image, mask = registrar.register(source, depth)
-        stem = frames.references.paths[index].stem
-        suffix = ".tiff" if image.dtype == np.float32 else ".png"
-        write_image(folder / f"{stem}{suffix}", image)
-        write_image(folder / "masks" / f"{stem}.png", mask)
-        if overlays:
-            picture = overlay(reference, image, mask == 0)
-            write_image(folder / "overlays" / f"{stem}.png", picture)
-        total.frames += 1
-        total.valid += int(np.count_nonzero(mask == 0))
-        total.pixels += mask.size
+    with open_sink(output, frame_rate(frames.references)) as sink:
+        for index in progress(range(len(frames)), len(frames), "registering", quiet):
+            reference, source, depth = frames.read(index)
+            image, mask = registrar.register(source, depth)
+            picture = overlay(reference, image, mask == 0) if overlays else None
+            sink.write(frames.references.name(index), image, mask, picture)
+            total.frames += 1
+            total.valid += int(np.count_nonzero(mask == 0))
+            total.pixels += mask.size
     total.seconds = time.perf_counter() - start
     return total

@@ -1,0 +1,234 @@
+"""Image topics of ROS 1 and ROS 2 bags and of MCAP files, through the library rosbags."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..frames import Image, InputError
+from .stream import Stream, Times
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+
+BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+
+RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+
+# Type, channels, and how to get to gray or to blue-green-red.
+ENCODINGS: dict[str, tuple[type[np.generic], int, int | None]] = {
+    "mono8": (np.uint8, 1, None),
+    "8UC1": (np.uint8, 1, None),
+    "mono16": (np.uint16, 1, None),
+    "16UC1": (np.uint16, 1, None),
+    "32FC1": (np.float32, 1, None),
+    "bgr8": (np.uint8, 3, None),
+    "8UC3": (np.uint8, 3, None),
+    "rgb8": (np.uint8, 3, cv2.COLOR_RGB2BGR),
+    "bgra8": (np.uint8, 4, cv2.COLOR_BGRA2BGR),
+    "rgba8": (np.uint8, 4, cv2.COLOR_RGBA2BGR),
+    "bgr16": (np.uint16, 3, None),
+    "rgb16": (np.uint16, 3, cv2.COLOR_RGB2BGR),
+    "bayer_rggb8": (np.uint8, 1, cv2.COLOR_BAYER_RGGB2BGR),
+    "bayer_bggr8": (np.uint8, 1, cv2.COLOR_BAYER_BGGR2BGR),
+    "bayer_gbrg8": (np.uint8, 1, cv2.COLOR_BAYER_GBRG2BGR),
+    "bayer_grbg8": (np.uint8, 1, cv2.COLOR_BAYER_GRBG2BGR),
+    "yuv422_yuy2": (np.uint8, 2, cv2.COLOR_YUV2BGR_YUY2),
+    "yuv422": (np.uint8, 2, cv2.COLOR_YUV2BGR_UYVY),
+}
+
+
+def is_bag(path: Path) -> bool:
+    """Whether the path is a bag: a file of its suffixes, or a ROS 2 folder."""
+    if path.suffix.lower() in BAG_SUFFIXES:
+        return True
+    metadata = path / "metadata.yaml"  # a name that folders of images may use too
+    return metadata.is_file() and b"rosbag2_bagfile_information" in metadata.read_bytes()
+
+
+class BagImages(Stream):
+    """The images of one topic; their times are the header stamps, else the times of recording."""
+
+    def __init__(self, path: Path, topic: str) -> None:
+        self.path = path
+        self._bag = _opened(path)
+        self.topic, self._kind = _image_topic(self._bag, path, topic)
+        self._connections = [c for c in self._bag.connections if c.topic == self.topic]
+        self._logged: list[int] = []
+        stamps = []
+        for _, logged, data in self._bag.messages(self._connections):
+            self._logged.append(logged)
+            stamps.append(self._stamp(data))
+        if not stamps:
+            raise InputError(f"{path}#{self.topic}: no message, expected images")
+        for nanoseconds in (stamps, self._logged):
+            times: Times = np.array(nanoseconds, np.int64) * np.float64(1e-9)
+            if (np.diff(times) > 0).all() and nanoseconds[0] > 0:
+                self.times = times
+                break
+        self._messages: Iterator[tuple[Any, int, bytes]] = iter(())
+        self._next = -1
+
+    def _stamp(self, data: bytes) -> int:
+        """Nanoseconds of the header, which stands first in both kinds of image."""
+        if self._bag.is2:
+            seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
+        else:
+            seconds, nanoseconds = struct.unpack_from("<II", data, 4)
+        return int(seconds) * 10**9 + int(nanoseconds)
+
+    def __len__(self) -> int:
+        return len(self._logged)
+
+    def read(self, index: int) -> Image:
+        if index != self._next:
+            # Messages of one time of recording come in the order of the bag.
+            logged = self._logged[index]
+            self._messages = self._bag.messages(self._connections, start=logged)
+            for _ in range(index - self._logged.index(logged)):
+                next(self._messages)
+        connection, _, data = next(self._messages)
+        self._next = index + 1
+        message = self._bag.deserialize(data, connection.msgtype)
+        if self._kind == COMPRESSED:
+            return _decompressed(message, self.where(index))
+        return _unpacked(message, self.where(index))
+
+    def name(self, index: int) -> str:
+        return f"{index:06d}"
+
+    def where(self, index: int) -> str:
+        return f"{self.path}#{self.topic} frame {index}"
+
+
+def _opened(path: Path) -> AnyReader:
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError(
+            f"{path}: bags need the library rosbags; install xcalib-rgbt[ros]"
+        ) from None
+    if not path.exists():
+        raise InputError(f"{path}: no such bag")
+    try:
+        # Bags in sqlite before ROS Iron carry no definitions of their messages.
+        bag = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        bag.open()
+    except Exception as error:  # each storage of rosbags has errors of its own
+        raise InputError(f"{path}: not a readable bag: {error}") from None
+    return bag
+
+
+def _topics(bag: AnyReader, *kinds: str) -> dict[str, str]:
+    return {c.topic: c.msgtype for c in bag.connections if c.msgtype in kinds}
+
+
+def _image_topic(bag: AnyReader, path: Path, topic: str) -> tuple[str, str]:
+    """A topic with images and its message type; without a name, the only one there is."""
+    found = _topics(bag, RAW, COMPRESSED)
+    if not topic and len(found) == 1:
+        return next(iter(found.items()))
+    if topic not in found:
+        names = ", ".join(sorted(found)) or "none"
+        raise InputError(
+            f"{path}#{topic}: expected {path}#TOPIC with a topic of images; it has {names}"
+        )
+    return topic, found[topic]
+
+
+def _unpacked(message: Any, where: str) -> Image:
+    """The pixels of a sensor_msgs/Image."""
+    if message.encoding not in ENCODINGS:
+        raise InputError(
+            f"{where}: encoding is {message.encoding!r}, expected one of {', '.join(ENCODINGS)}"
+        )
+    dtype, channels, conversion = ENCODINGS[message.encoding]
+    width, height, step = message.width, message.height, message.step
+    pixel = np.dtype(dtype).itemsize * channels
+    data: NDArray[np.uint8] = np.asarray(message.data, np.uint8)
+    if min(width, height) < 1 or step < width * pixel or data.size < step * height:
+        raise InputError(
+            f"{where}: {data.size} bytes, rows of {step}, are no {width}x{height}"
+            f" {message.encoding} image"
+        )
+    rows = np.ascontiguousarray(data[: step * height].reshape(height, step)[:, : width * pixel])
+    order: Literal["<", ">"] = ">" if message.is_bigendian else "<"
+    image: Image = rows.view(np.dtype(dtype).newbyteorder(order)).astype(dtype, copy=False)
+    if channels > 1:
+        image = image.reshape(height, width, channels)
+    return image.copy() if conversion is None else cv2.cvtColor(image, conversion)
+
+
+def _decompressed(message: Any, where: str) -> Image:
+    """The pixels of a sensor_msgs/CompressedImage: JPEG, PNG or what else OpenCV decodes."""
+    data = np.asarray(message.data, np.uint8)
+    image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    if image is None or image.dtype not in (np.uint8, np.uint16, np.float32):
+        raise InputError(
+            f"{where}: cannot decode {data.size} bytes, format {message.format!r};"
+            " expected a JPEG or PNG"
+        )
+    return image[..., :3].copy() if image.ndim == 3 else image
+
+
+@dataclass(frozen=True)
+class CameraInfo:
+    """What a driver says of its camera."""
+
+    topic: str
+    width: int
+    height: int
+    """[px]"""
+    K: NDArray[np.float64]
+    """(3, 3) intrinsic matrix [px]."""
+    model: str
+    """Distortion model, such as plumb_bob."""
+    D: NDArray[np.float64]
+    """Coefficients of the model."""
+
+    def line(self) -> str:
+        """In words; the intrinsics as ``--reference-intrinsics`` takes them."""
+        fx, fy, cx, cy = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
+        bent = f"{self.model} {np.array2string(self.D, precision=6)}" if self.D.any() else "none"
+        return (
+            f"{self.topic}: {self.width}x{self.height} px,"
+            f" FX,FY,CX,CY {fx:.6g},{fy:.6g},{cx:.6g},{cy:.6g} px, distortion {bent}"
+        )
+
+
+def camera_infos(path: str | Path) -> list[CameraInfo]:
+    """The first message of every camera_info topic of a bag, by topic; `InputError` if none."""
+    bag = _opened(Path(path))
+    try:
+        infos = []
+        for topic in sorted(_topics(bag, CAMERA_INFO)):
+            connections = [c for c in bag.connections if c.topic == topic]
+            for connection, _, data in bag.messages(connections):
+                message: Any = bag.deserialize(data, connection.msgtype)
+                # ROS 1 has capital names for what ROS 2 has in small ones.
+                K, D = (getattr(message, n, getattr(message, n.upper(), None)) for n in "kd")
+                infos.append(
+                    CameraInfo(
+                        topic,
+                        message.width,
+                        message.height,
+                        np.asarray(K, np.float64).reshape(3, 3),
+                        message.distortion_model,
+                        np.asarray(D, np.float64),
+                    )
+                )
+                break
+    finally:
+        bag.close()
+    if not infos:
+        raise InputError(f"{path}: no camera_info with messages in it")
+    return infos

@@ -1,0 +1,113 @@
+"""Streams of image files: folders, patterns, and the pages of one TIFF."""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ..frames import IMAGE_SUFFIXES, Image, InputError, list_files, natural_key, read_image
+from .stream import Stream
+from .times import read_times, times_of_names
+
+TIME_TABLES = ("timestamps.csv", "timestamps.txt")
+"""Read, if there, from the folder of the images."""
+
+
+class ImageFiles(Stream):
+    """A list of image files; their times stand in their names or in a table beside them."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.paths = list(paths)
+        self.times = times_of_names([path.stem for path in self.paths])
+        for table in TIME_TABLES:
+            if self.paths and (self.paths[0].parent / table).is_file():
+                self.times = read_times(self.paths[0].parent / table, self)
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def read(self, index: int) -> Image:
+        return read_image(self.paths[index])
+
+    def name(self, index: int) -> str:
+        return self.paths[index].stem
+
+    def where(self, index: int) -> str:
+        return str(self.paths[index])
+
+
+def matching_files(pattern: Path) -> list[Path]:
+    """Image files of a pattern with ``*``, ``?``, ``[...]``, or a number as in ``%06d``."""
+    number = re.fullmatch(r"(.*)%(0\d+)?d(.*)", pattern.name)
+    if number:
+        before, width, after = number[1], number[2], number[3]
+        digits = rf"\d{{{int(width)},}}" if width else r"\d+"
+        name = re.compile(re.escape(before) + digits + re.escape(after))
+        folder = pattern.parent
+        found = (
+            [path for path in folder.iterdir() if name.fullmatch(path.name)]
+            if (folder.is_dir())
+            else []
+        )
+    else:
+        found = [Path(path) for path in glob.glob(str(pattern))]
+    found = [path for path in found if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file()]
+    if not found:
+        raise InputError(f"{pattern}: no image file matches")
+    return sorted(found, key=lambda path: natural_key(str(path)))
+
+
+class Pages(Stream):
+    """The pages of a TIFF stack."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        try:
+            self._count = cv2.imcount(str(path), cv2.IMREAD_UNCHANGED)
+        finally:
+            cv2.utils.logging.setLogLevel(level)
+        if not self._count:
+            raise InputError(f"{path}: cannot decode, truncated or not a TIFF")
+
+    def __len__(self) -> int:
+        return self._count
+
+    def read(self, index: int) -> Image:
+        level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        try:
+            done, pages = cv2.imreadmulti(str(self.path), index, 1, flags=cv2.IMREAD_UNCHANGED)
+        except cv2.error:
+            done, pages = False, ()
+        finally:
+            cv2.utils.logging.setLogLevel(level)
+        if not done or len(pages) != 1:
+            raise InputError(f"{self.where(index)}: cannot decode, truncated")
+        page: Image = pages[0]
+        if page.dtype not in (np.uint8, np.uint16, np.float32):
+            raise InputError(
+                f"{self.where(index)}: pixels are {page.dtype}, expected uint8, uint16 or float32"
+            )
+        return np.ascontiguousarray(page[..., :3] if page.ndim == 3 else page)
+
+    def name(self, index: int) -> str:
+        return f"{index:06d}"
+
+    def where(self, index: int) -> str:
+        return f"{self.path} page {index}"
+
+
+def open_files(path: Path) -> Stream | None:
+    """The stream of a folder, a pattern or a TIFF; None where the path is none of these."""
+    if path.is_dir():
+        return ImageFiles(list_files(path))
+    if path.is_file():
+        return Pages(path) if path.suffix.lower() in (".tif", ".tiff") else None
+    if re.search(r"[*?\[]|%(0\d+)?d", path.name):
+        return ImageFiles(matching_files(path))
+    return None

@@ -1,0 +1,123 @@
+"""Two streams as the arguments of the commands name them, paired."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..depth import (
+    DEPTH_SUFFIXES,
+    PNG_SCALE,
+    Depth,
+    DepthProvider,
+    NetworkOptions,
+    PlaneDepth,
+    open_depth,
+)
+from ..frames import Image, InputError, list_files
+from .offset import estimate_offset
+from .pairing import Pairing, match_depths, pair_streams
+from .sources import open_stream
+from .stream import Picked, Stream
+from .times import read_times
+
+
+@dataclass(frozen=True)
+class Matching:
+    """How to pair two streams: the arguments of `pair_streams`, and where times come from."""
+
+    method: str = "auto"
+    time_offset: float | None = 0.0
+    """By how much the source's clock is late [s]; None: estimated from the footage."""
+    max_gap: float | None = None
+    """Largest distance of a pair in time [s]; None: half the slower stream's period."""
+    reference_times: Path | None = None
+    """Table of `read_times`; None: what the stream itself tells."""
+    source_times: Path | None = None
+
+
+@dataclass(frozen=True)
+class PickedDepth:
+    """Depth of some frames of a stream."""
+
+    depth: DepthProvider
+    indices: list[int]
+
+    def __call__(self, index: int, reference: Image) -> Depth:
+        return self.depth(self.indices[index], reference)
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Two streams and which of their frames belong together."""
+
+    all_references: Stream
+    all_sources: Stream
+    pairing: Pairing
+    notes: tuple[str, ...]
+    """What the user should know, a line each."""
+
+    @property
+    def references(self) -> Stream:
+        """The reference frames that have a partner."""
+        return _picked(self.all_references, self.pairing.references)
+
+    @property
+    def sources(self) -> Stream:
+        """Their partners, in the same order."""
+        return _picked(self.all_sources, self.pairing.sources)
+
+    def open_depth(
+        self,
+        spec: str,
+        scale: float = PNG_SCALE,
+        plane: PlaneDepth | None = None,
+        network: NetworkOptions | None = None,
+    ) -> DepthProvider:
+        """Depth of `references`; of a folder the files that `match_depths` finds."""
+        used, folder = self.pairing.references, Path(spec)
+        if spec == "plane" or not folder.is_dir():
+            stream = self.all_references
+            paths = [Path(f"{stream.name(index)}.png") for index in range(len(stream))]
+            provider = open_depth(spec, getattr(stream, "paths", paths), scale, plane, network)
+            return PickedDepth(provider, used.tolist())
+        files = list_files(folder, DEPTH_SUFFIXES)
+        matched = match_depths(self.all_references, used, files, folder)
+        return PickedDepth(open_depth(spec, files, scale), matched)
+
+
+def _picked(stream: Stream, indices: NDArray[np.intp]) -> Stream:
+    chosen = indices.tolist()
+    return stream if chosen == list(range(len(stream))) else Picked(stream, chosen)
+
+
+def open_pairs(
+    reference: str | Path, source: str | Path, matching: Matching | None = None
+) -> Pairs:
+    """Open and pair what REFERENCE and SOURCE name; nothing but times is read, save that an
+    offset to be estimated needs the frames.
+    """
+    matching = matching or Matching()
+    streams = open_stream(reference), open_stream(source)
+    for stream, table in zip(
+        streams, (matching.reference_times, matching.source_times), strict=True
+    ):
+        if table is not None:
+            stream.times = read_times(table, stream)
+    notes: list[str] = []
+    offset = matching.time_offset
+    if offset is None:
+        if matching.method not in ("auto", "time"):
+            raise InputError(
+                f"a clock offset needs frames paired by time; they are by {matching.method}"
+            )
+        estimate = estimate_offset(*streams)
+        notes.append(f"clock offset: {estimate.line()}")
+        offset = estimate.offset
+    pairing = pair_streams(*streams, matching.method, offset, matching.max_gap)
+    if pairing.method == "time":
+        notes.append(f"frames: {pairing.line()}")
+    return Pairs(*streams, pairing, tuple(notes))

@@ -1,0 +1,645 @@
+"""Footage of every kind: streams, pairing by time, clock offset, and the commands on them."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from conftest import FRAMES, run
+from xcalib import Pinhole, Rig, synthetic
+from xcalib.depth import read_depth
+from xcalib.footage import (
+    Stream,
+    camera_infos,
+    estimate_offset,
+    match_depths,
+    open_pairs,
+    open_stream,
+    pair_streams,
+    pair_times,
+    read_times,
+    refine_offset,
+)
+from xcalib.footage.writer import VideoSink
+from xcalib.frames import Image, InputError, list_files, read_image, write_image
+
+Refused = Callable[..., str]
+
+
+def moving(count: int, dtype: type = np.uint8, channels: int = 1) -> list[Image]:
+    """Frames that differ, smooth enough for lossy codecs."""
+    rng = np.random.default_rng(2)
+    wide = cv2.GaussianBlur(rng.random((120, 160 + 3 * count), np.float32), (0, 0), 6)
+    wide = cv2.normalize(wide, None, 0, 1, cv2.NORM_MINMAX)
+    top = np.iinfo(dtype).max
+    frames = [(wide[:, 3 * i : 3 * i + 160] * top).astype(dtype) for i in range(count)]
+    return [np.dstack([f, f // 2, f // 3]) if channels == 3 else f for f in frames]
+
+
+def write_video(path: Path, frames: list[Image], codec: str, rate: float = 20) -> Path:
+    height, width = frames[0].shape[:2]
+    depth = cv2.CV_16U if frames[0].dtype == np.uint16 else cv2.CV_8U
+    flags = (
+        *(cv2.VIDEOWRITER_PROP_IS_COLOR, int(frames[0].ndim == 3)),
+        *(cv2.VIDEOWRITER_PROP_DEPTH, depth),
+    )
+    fourcc = cv2.VideoWriter.fourcc(*codec)
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, fourcc, rate, (width, height), flags)
+    assert writer.isOpened()
+    for frame in frames:
+        writer.write(frame)
+    writer.release()
+    return path
+
+
+# -- Files
+
+
+def test_patterns_and_numbers(tmp_path: Path) -> None:
+    for name in ("a_2", "a_10", "a_x", "b_3"):
+        write_image(tmp_path / f"{name}.png", moving(1)[0])
+    starred = open_stream(tmp_path / "a_*.png")
+    assert [starred.name(i) for i in range(len(starred))] == ["a_2", "a_10", "a_x"]
+    numbered = open_stream(tmp_path / "a_%d.png")
+    assert [numbered.name(i) for i in range(len(numbered))] == ["a_2", "a_10"]
+    assert [numbered[1:].name(0), len(numbered[1:])] == ["a_10", 1]
+    with pytest.raises(InputError, match=r"c_\*\.png: no image file matches"):
+        open_stream(tmp_path / "c_*.png")
+    with pytest.raises(InputError, match="none: no such folder"):
+        open_stream(tmp_path / "none")
+
+
+def test_tiff_stack_keeps_16_bit(tmp_path: Path) -> None:
+    frames = moving(4, np.uint16)
+    cv2.imwritemulti(str(tmp_path / "s.tiff"), frames)
+    stack = open_stream(tmp_path / "s.tiff")
+    assert len(stack) == 4
+    np.testing.assert_array_equal(stack[2], frames[2])
+
+
+@pytest.mark.parametrize(
+    ("names", "seconds"),
+    [
+        (["1699999999.123456", "1699999999.223456"], [1699999999.123456, 1699999999.223456]),
+        (
+            ["t_1699999999123456789", "t_1699999999223456789"],
+            [1699999999.123457, 1699999999.2234567],
+        ),
+        (["1699999999123", "1699999999223"], [1699999999.123, 1699999999.223]),
+        (["000001", "000002"], None),
+        (["1699999999.2", "1699999999.1x", "1699999999.0y"], None),
+    ],
+)
+def test_times_in_names(tmp_path: Path, names: list[str], seconds: list[float] | None) -> None:
+    for name in names:
+        write_image(tmp_path / f"{name}.png", moving(1)[0])
+    times = open_stream(tmp_path).times
+    if seconds is None or len(names) == 3:
+        # The three rise in natural order: 0y, 1x, 2.
+        assert (times is None) == (seconds is None and len(names) == 2)
+    else:
+        np.testing.assert_allclose(times, seconds, rtol=0, atol=1e-6)
+
+
+def test_times_from_tables(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        write_image(tmp_path / f"{name}.png", moving(1)[0])
+    (tmp_path / "timestamps.csv").write_text("name,timestamp\na.png, 2.5\nb.png, 2.75\n")
+    np.testing.assert_array_equal(open_stream(tmp_path).times, [2.5, 2.75])
+    table = tmp_path / "other.txt"
+    stream = open_stream(tmp_path)
+    table.write_text("# ns\na 1700000000000000000\nb 1700000000500000000\n")
+    np.testing.assert_allclose(read_times(table, stream), [1.7e9, 1.7e9 + 0.5], rtol=0, atol=1e-6)
+    for text, problem in (
+        ("a 1\n", "no time of b"),
+        ("a 1\nb x\n", "line 2: 'b x'"),
+        ("a 2\nb 1\n", "b is earlier than a"),
+    ):
+        table.write_text(text)
+        with pytest.raises(InputError, match=f"other.txt.*{problem}"):
+            read_times(table, stream)
+
+
+# -- Videos
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "dtype", "channels", "tolerance"),
+    [
+        ("a.mkv", "FFV1", np.uint8, 1, 0),
+        ("a.mkv", "FFV1", np.uint8, 3, 0),
+        ("a.mkv", "FFV1", np.uint16, 1, 0),
+        ("a.mp4", "mp4v", np.uint8, 3, 4),
+        ("a.avi", "MJPG", np.uint8, 3, 4),
+    ],
+)
+def test_video_in_any_order(
+    tmp_path: Path, name: str, codec: str, dtype: type, channels: int, tolerance: int
+) -> None:
+    frames = moving(90, dtype, channels)
+    video = open_stream(write_video(tmp_path / name, frames, codec))
+    assert len(video) == 90
+    np.testing.assert_allclose(video.times, np.arange(90) / 20, atol=2e-3)
+    in_order = list(video)
+    assert in_order[0].dtype == dtype and in_order[0].shape == frames[0].shape
+    for found, true in zip(in_order, frames, strict=True):
+        assert np.abs(found.astype(int) - true.astype(int)).mean() <= tolerance
+    for index in (77, 3, 4, 4, 89, 0, 70, 5):
+        np.testing.assert_array_equal(video[index], in_order[index])
+    with pytest.raises(IndexError):
+        video[90]
+
+
+@pytest.mark.parametrize(
+    ("name", "codec"), [("a.avi", "MJPG"), ("a.mkv", "FFV1"), ("a.mp4", "mp4v")]
+)
+def test_truncated_video(tmp_path: Path, name: str, codec: str) -> None:
+    path = write_video(tmp_path / name, moving(30), codec)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+    with pytest.raises(InputError, match=rf"{name}: cannot decode frame \d+.*truncated"):
+        open_stream(path)
+
+
+def test_a_seek_that_leads_astray_is_not_believed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Astray:
+        def __init__(self, *arguments: Any) -> None:
+            self.capture = capture(*arguments)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.capture, name)
+
+        def set(self, key: int, value: float) -> bool:
+            off = 3 if key == cv2.CAP_PROP_POS_FRAMES else 0
+            return bool(self.capture.set(key, value + off))
+
+    capture = cv2.VideoCapture
+    frames = moving(90)
+    path = write_video(tmp_path / "a.mkv", frames, "FFV1")
+    monkeypatch.setattr(cv2, "VideoCapture", Astray)
+    video = open_stream(path)
+    for index in (80, 2, 79):
+        np.testing.assert_array_equal(video[index], frames[index])
+
+
+def test_halves(tmp_path: Path) -> None:
+    frames = moving(3)
+    path = write_video(tmp_path / "w.mkv", frames, "FFV1")
+    left, bottom = open_stream(f"{path}#left"), open_stream(f"{path}#bottom")
+    np.testing.assert_array_equal(left[1], frames[1][:, :80])
+    np.testing.assert_array_equal(bottom[2], frames[2][60:])
+    assert left.times is not None and len(left) == 3
+    with pytest.raises(InputError, match=r"w\.mkv#middle: expected.*#left"):
+        open_stream(f"{path}#middle")
+    write_image(tmp_path / "odd" / "1.png", np.zeros((5, 7), np.uint8))
+    with pytest.raises(InputError, match=r"1\.png: its width is 7 px, expected an even one"):
+        open_stream(f"{tmp_path / 'odd'}#right")[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "image", "problem"),
+    [
+        ("a.mp4", np.zeros((4, 4), np.uint16), "uint16 gray; .mp4 holds uint8, a folder holds any"),
+        ("a.mkv", np.zeros((4, 4), np.float32), "float32 gray; .mkv holds uint8 and gray uint16"),
+        ("a.mkv", np.zeros((4, 4, 3), np.uint16), "uint16 colour"),
+        ("a.avi", np.zeros((4, 5), np.uint8), "5x4; a video holds even sizes"),
+    ],
+)
+def test_what_a_video_cannot_hold(tmp_path: Path, name: str, image: Image, problem: str) -> None:
+    mask = np.zeros(image.shape[:2], np.uint8)
+    with pytest.raises(InputError, match=problem), VideoSink(tmp_path / name, 10) as sink:
+        sink.write("0", image, mask, None)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_video_is_whole_or_absent(tmp_path: Path) -> None:
+    frames = moving(3, np.uint16)
+    mask = np.full((120, 160), 2, np.uint8)
+    with VideoSink(tmp_path / "a.mkv", 10) as sink:
+        for frame in frames:
+            sink.write("", frame, mask, None)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.masks.mkv", "a.mkv"]
+    np.testing.assert_array_equal(open_stream(tmp_path / "a.mkv")[2], frames[2])
+    np.testing.assert_array_equal(open_stream(tmp_path / "a.masks.mkv")[1], mask)
+    with pytest.raises(InputError), VideoSink(tmp_path / "b.mkv", 10) as sink:
+        sink.write("", frames[0], mask, np.zeros((2, 2), np.float32))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.masks.mkv", "a.mkv"]
+
+
+# -- Bags
+
+
+def encoded(image: Image, encoding: str) -> Image:
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if encoding == "rgb8" else image
+
+
+def write_bag(path: Path, kind: str, topics: dict[str, tuple[str, list[Image]]]) -> str:
+    """A bag with topics of (encoding, images), 0.1 s apart, and a camera_info; what to open."""
+    pytest.importorskip("rosbags")
+    from rosbags import rosbag1, rosbag2
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.ROS2_HUMBLE)
+    types = store.types
+    pack: Any = store.serialize_ros1 if kind == "ros1" else store.serialize_cdr
+
+    def header(stamp: int) -> Any:
+        time = types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9)
+        extra = (0,) if kind == "ros1" else ()
+        return types["std_msgs/msg/Header"](*extra, stamp=time, frame_id="c")
+
+    if kind == "ros1":
+        writer: Any = rosbag1.Writer(path)
+    else:
+        plugin = rosbag2.StoragePlugin.MCAP if kind == "mcap" else rosbag2.StoragePlugin.SQLITE3
+        writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
+    with writer:
+        for number, (topic, (encoding, images)) in enumerate(topics.items()):
+            name = "sensor_msgs/msg/" + ("CompressedImage" if encoding == "png" else "Image")
+            connection = writer.add_connection(topic, name, typestore=store)
+            for index, image in enumerate(images):
+                stamp = 1_700_000_000_000_000_000 + index * 100_000_000 + number * 10_000_000
+                if encoding == "png":
+                    data = cv2.imencode(".png", image)[1].ravel()
+                    message = types[name](header(stamp), "png", data)
+                else:
+                    pixels = np.ascontiguousarray(encoded(image, encoding))
+                    height, width = image.shape[:2]
+                    message = types[name](
+                        *(header(stamp), height, width, encoding, 0),
+                        *(pixels.nbytes // height, pixels.view(np.uint8).ravel()),
+                    )
+                # Two messages share a time of recording; the header tells them apart.
+                writer.write(connection, stamp // 200_000_000 * 200_000_000, pack(message, name))
+        name = "sensor_msgs/msg/CameraInfo"
+        connection = writer.add_connection("/visible/camera_info", name, typestore=store)
+        K = np.array([300.0, 0, 160, 0, 301, 120, 0, 0, 1])
+        roi = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
+        info = types[name](
+            *(header(0), 240, 320, "plumb_bob", np.array([0.1, 0, 0, 0, 0])),
+            *(K, np.eye(3).ravel(), np.zeros(12), 0, 0, roi),
+        )
+        writer.write(connection, 1_700_000_000_000_000_000, pack(info, name))
+    return str(next(path.glob("*.mcap")) if kind == "mcap" else path)
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite", "mcap"])
+def test_bags(tmp_path: Path, kind: str) -> None:
+    colour, deep = moving(6, channels=3), moving(6, np.uint16)
+    topics = {"/visible": ("rgb8", colour), "/thermal": ("mono16", deep), "/png": ("png", deep)}
+    bag = write_bag(tmp_path / ("drive.bag" if kind == "ros1" else "drive"), kind, topics)
+    visible, thermal = open_stream(f"{bag}#/visible"), open_stream(f"{bag}#/thermal")
+    np.testing.assert_allclose(visible.times, 1.7e9 + 0.1 * np.arange(6), rtol=0, atol=1e-6)
+    for found, true in zip(visible, colour, strict=True):
+        np.testing.assert_array_equal(found, true)
+    for index in (4, 5, 1, 0, 3):
+        np.testing.assert_array_equal(thermal[index], deep[index])
+    np.testing.assert_array_equal(open_stream(f"{bag}#/png")[5], deep[5])
+    assert pair_streams(visible, thermal).gap == pytest.approx(0.01, abs=1e-6)
+    with pytest.raises(InputError, match="with a topic of images; it has /png, /thermal, /visible"):
+        open_stream(f"{bag}#/depth")
+    (info,) = camera_infos(bag)
+    assert (info.width, info.height, info.model) == (320, 240, "plumb_bob")
+    assert info.K[1, 1] == 301 and info.D[0] == 0.1
+    result = run("inspect", bag)
+    assert result.exit_code == 0, result.output
+    assert "FX,FY,CX,CY 300,301,160,120 px" in result.stdout
+
+
+def test_bags_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    with pytest.raises(InputError, match=r"a\.mcap: bags need .* install xcalib-rgbt\[ros\]"):
+        open_stream(f"{tmp_path / 'a.mcap'}#/x")
+
+
+def test_a_folder_of_images_may_hold_metadata(tmp_path: Path) -> None:
+    write_image(tmp_path / "1.png", moving(1)[0])
+    (tmp_path / "metadata.yaml").write_text("camera: thermal\n")
+    assert len(open_stream(tmp_path)) == 1
+
+
+def test_bad_bags(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(InputError, match=r"a\.mcap: not a readable bag"):
+        open_stream(f"{tmp_path / 'a.mcap'}#/x")
+    with pytest.raises(InputError, match=r"none\.bag: no such bag"):
+        open_stream(f"{tmp_path / 'none.bag'}#/x")
+    stream = open_stream(write_bag(tmp_path / "b.bag", "ros1", {"/x": ("strange", moving(1))}))
+    with pytest.raises(InputError, match="encoding is 'strange', expected one of mono8"):
+        stream[0]
+
+
+# -- Pairing
+
+
+def test_times_pair_nearest_one_to_one() -> None:
+    fast, slow = np.arange(0, 2, 1 / 30), np.arange(0.004, 2, 1 / 9)
+    found = pair_times(fast, slow)
+    assert found.dropped == (60 - 18, 0)
+    np.testing.assert_array_equal(found.sources, np.arange(18))
+    nearest = np.abs(fast[:, None] - slow).argmin(axis=0)
+    np.testing.assert_array_equal(found.references, nearest)
+    swapped = pair_times(slow, fast)
+    np.testing.assert_array_equal(swapped.sources, found.references)
+
+
+def test_dropped_frames_and_offset() -> None:
+    times = np.arange(20) / 10
+    late = np.delete(times + 0.3, [4, 5, 11]) + np.random.default_rng(0).normal(0, 0.005, 17)
+    found = pair_times(times, late, offset=0.3)
+    np.testing.assert_array_equal(found.references, np.delete(np.arange(20), [4, 5, 11]))
+    assert found.dropped == (3, 0) and found.gap < 0.02
+    assert "17 pairs by time" in found.line() and "3 reference, 0 source" in found.line()
+    assert len(pair_times(times, late, offset=0.3, max_gap=0.004).references) < 17
+    with pytest.raises(InputError, match="no two frames are within"):
+        pair_times(times, late + 1e9)
+
+
+class Listed(Stream):
+    """Images in memory."""
+
+    def __init__(self, images: list[Image], times: Any = None) -> None:
+        self.images, self.times = images, times
+
+    def __len__(self) -> int:
+        return len(self.images)
+
+    def read(self, index: int) -> Image:
+        return self.images[index]
+
+    def name(self, index: int) -> str:
+        return f"{index:06d}"
+
+    def where(self, index: int) -> str:
+        return f"memory frame {index}"
+
+
+def test_methods_need_what_they_need() -> None:
+    four, three = Listed(moving(4)), Listed(moving(3))
+    assert pair_streams(four, four).method == "order"
+    for arguments, problem in (
+        ((four, three), "first of 4 frames, memory frame 0 of 3"),
+        ((four, four, "time"), "reference frames have no times"),
+        ((four, four, "name"), "needs two folders"),
+        ((four, four, "order", 0.5), "offset of 0.5 s needs frames paired by time"),
+    ):
+        with pytest.raises(InputError, match=problem):
+            pair_streams(*arguments)
+
+
+def test_depth_of_the_frames_in_use(tmp_path: Path) -> None:
+    used = np.array([1, 3])
+    stream = Listed(moving(4), 50.0 + 0.1 * np.arange(4))
+
+    def found(*names: str) -> list[int]:
+        depths = [Path("depth") / f"{name}.npy" for name in names]
+        return match_depths(stream, used, depths, Path("depth"))
+
+    assert found("000000", "000001", "000003") == [1, 2]  # by name, one is left over
+    assert found("d0", "d1", "d2", "d3") == [1, 3]  # by number, of all frames
+    assert found("x", "y") == [0, 1]  # in order, of those in use
+    with pytest.raises(InputError, match="expected as many"):
+        found("x", "y", "z")
+    stream.times = 1.7e9 + 0.1 * np.arange(4)
+    assert found("1700000000.11", "1700000000.20", "1700000000.31") == [0, 2]
+    with pytest.raises(InputError, match="no depth map near the time of memory frame 3"):
+        found("1700000000.11", "1700000000.20")
+
+
+# -- Clock offset
+
+
+def textured(seed: int) -> Image:
+    rng = np.random.default_rng(seed)
+    image = np.full((400, 1000), 90, np.float32)
+    for _ in range(200):
+        x, y, w, h = (int(v) for v in rng.integers((0, 0, 8, 8), (1000, 400, 90, 90)))
+        cv2.rectangle(image, (x, y), (x + w, y + h), float(rng.uniform(0, 255)), -1)
+    return cv2.GaussianBlur(image, (0, 0), 1.2)
+
+
+VISIBLE = textured(0)
+THERMAL = 255 - np.abs(VISIBLE * 1.7 % 510 - 255)
+
+
+class Pan(Stream):
+    """A window that wanders over a picture; gain and level jump now and then."""
+
+    def __init__(
+        self, picture: Image, scene_times: Any, late: float, moves: bool, noise: float, seed: int
+    ) -> None:
+        self.picture, self.scene_times, self.noise = picture, scene_times, noise
+        self.times = scene_times + late
+        self.seed, self.moves = seed, moves
+        rng = np.random.default_rng(seed)
+        self.gain, self.level = np.ones(len(self)), np.zeros(len(self))
+        for at in rng.integers(0, len(self), max(2, len(self) // 50)) if seed else ():
+            self.gain[at:], self.level[at:] = rng.uniform(0.4, 1.3), rng.uniform(-30, 30)
+
+    def __len__(self) -> int:
+        return len(self.scene_times)
+
+    def read(self, index: int) -> Image:
+        knots = np.cumsum(np.random.default_rng(9).normal(0, 12, (100, 2)), axis=0)
+        at = 6 * (self.scene_times[index] + 1) * self.moves
+        x, y = (np.interp(at, np.arange(100), column) for column in knots.T)
+        move = np.array([[1.0, 0, 450 + x], [0, 1, 150 + y / 4]])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        image = cv2.warpAffine(
+            self.picture, move, (240, 160), flags=flags, borderMode=cv2.BORDER_REFLECT
+        )
+        rng = np.random.default_rng((self.seed, index))
+        image = (
+            image * self.gain[index] + self.level[index] + rng.normal(0, self.noise, image.shape)
+        )
+        return image.clip(0, 255).astype(np.uint8)
+
+    def name(self, index: int) -> str:
+        return f"{index:06d}"
+
+    def where(self, index: int) -> str:
+        return f"pan frame {index}"
+
+
+def pans(late: float, rate: float = 30, moves: bool = True) -> tuple[Stream, Stream]:
+    visible = Pan(VISIBLE, np.arange(0, 7, 1 / 30), 0, moves, 3, 0)
+    return visible, Pan(THERMAL, np.arange(0.01, 7, 1 / rate), late, moves, 6, 1)
+
+
+@pytest.mark.parametrize("late", [10 / 30, -0.2, 0.047])
+def test_clock_offset_to_a_fraction_of_a_frame(late: float) -> None:
+    estimate = estimate_offset(*pans(late))
+    assert estimate.trusted
+    assert estimate.offset == pytest.approx(late, abs=0.008)
+    assert f"late by {estimate.offset:+.4f} s" in estimate.line()
+
+
+def test_clock_offset_of_a_slow_camera() -> None:
+    estimate = estimate_offset(*pans(0.15, rate=9))
+    assert estimate.trusted
+    assert estimate.offset == pytest.approx(0.15, abs=0.03)
+
+
+def test_a_rig_that_stands_still_tells_no_offset() -> None:
+    estimate = estimate_offset(*pans(0.15, moves=False))
+    assert not estimate.trusted and estimate.offset == 0
+    assert "moves too little" in estimate.line() and "0 s is used" in estimate.line()
+
+
+def test_offset_is_refined_by_registration(rendered: Path) -> None:
+    rig = Rig.load(rendered / "rig.yaml")
+    visible, thermal = open_stream(rendered / "visible"), open_stream(rendered / "thermal")
+    visible.times, thermal.times = np.arange(FRAMES) * 0.5, np.arange(FRAMES) * 0.5 + 0.5
+    depths = list_files(rendered / "depth")
+    best, scores = refine_offset(
+        rig, visible, thermal, lambda index, _: read_depth(depths[index]), [0, 0.5, 1.0], 3
+    )
+    assert best == 0.5
+    assert scores[1] > max(scores[0], scores[2])
+
+
+# -- The commands
+
+
+@pytest.fixture(scope="session")
+def filmed(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`rendered`, cut to even sizes, as visible.mkv and thermal.mkv, and as folders."""
+    folder = tmp_path_factory.mktemp("filmed")
+    for kind in ("visible", "thermal"):
+        images = []
+        for path in list_files(rendered / kind):
+            image = read_image(path)
+            image = image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2]
+            images.append(np.ascontiguousarray(image))
+            write_image(folder / kind / path.name, image)
+        write_video(folder / f"{kind}.mkv", images, "FFV1", 10)
+    return folder
+
+
+def test_calibrate_two_videos(filmed: Path, rendered: Path, tmp_path: Path) -> None:
+    visible, thermal, out = filmed / "visible.mkv", filmed / "thermal.mkv", tmp_path / "rig.yaml"
+    inputs = ("--depth", rendered / "depth", "--working-width", 160)
+    result = run("calibrate", visible, thermal, *inputs, "-o", out)
+    assert result.exit_code == 0, result.output
+    assert f"{FRAMES} pairs by time" in result.stderr
+    depth = read_depth(list_files(rendered / "depth")[0])
+    error = synthetic.end_point_error(Rig.load(out), Rig.load(rendered / "rig.yaml"), depth)
+    assert np.nanmedian(error) < 0.5
+
+
+@pytest.mark.parametrize("suffix", [".mkv", ".mp4"])
+def test_register_a_video_into_a_video(
+    filmed: Path, rendered: Path, tmp_path: Path, suffix: str
+) -> None:
+    inputs = ("--depth", rendered / "depth", "--quiet")
+    rig, film = rendered / "rig.yaml", tmp_path / f"out{suffix}"
+    visible, thermal = filmed / "visible.mkv", filmed / "thermal.mkv"
+    result = run("register", rig, visible, thermal, *inputs, "-o", film)
+    assert result.exit_code == 0, result.output
+    folder = tmp_path / "images"
+    result = run("register", rig, filmed / "visible", filmed / "thermal", *inputs, "-o", folder)
+    assert result.exit_code == 0, result.output
+    images, masks = open_stream(film), open_stream(tmp_path / "out.masks.mkv")
+    assert images.times is not None and images.times[1] == pytest.approx(0.1, abs=1e-3)
+    for index, path in enumerate(list_files(folder)):
+        found = images[index] if suffix == ".mkv" else images[index][..., 0]
+        error = np.abs(found.astype(int) - read_image(path).astype(int))
+        assert error.mean() <= (0 if suffix == ".mkv" else 4)
+        np.testing.assert_array_equal(masks[index], read_image(folder / "masks" / path.name))
+
+
+@pytest.mark.parametrize("kind", ["ros1", "mcap"])
+def test_register_and_evaluate_a_bag(rendered: Path, tmp_path: Path, kind: str) -> None:
+    visible, thermal = (
+        [read_image(path) for path in list_files(rendered / name)]
+        for name in ("visible", "thermal")
+    )
+    topics = {"/visible": ("rgb8", visible), "/thermal": ("mono8", thermal)}
+    bag = write_bag(tmp_path / ("drive.bag" if kind == "ros1" else "drive"), kind, topics)
+    frames = (f"{bag}#/visible", f"{bag}#/thermal", "--depth", rendered / "depth")
+    rig, out = rendered / "rig.yaml", tmp_path / "out"
+    result = run("register", rig, *frames, "-o", out)
+    assert result.exit_code == 0, result.output
+    assert "median gap 10.0 ms" in result.stderr
+    assert [path.stem for path in list_files(out)] == [f"{i:06d}" for i in range(FRAMES)]
+    result = run("evaluate", rig, *frames)
+    assert result.exit_code == 0, result.output
+    change = re.search(r"NEC .* ([+-][0-9.]+) %", result.stdout)
+    assert change and float(change[1]) > 5
+
+
+def test_late_source_is_paired_with_its_scene(rendered: Path, tmp_path: Path) -> None:
+    """The offset given, a reference without a partner falls out, and depth goes with the rest."""
+    for name, late in (("visible", 0.0), ("thermal", 0.5)):
+        lines = []
+        for index, path in enumerate(list_files(rendered / name)):
+            write_image(tmp_path / name / path.name, read_image(path))
+            lines.append(f"{path.name} {0.5 * index + late}\n")
+        (tmp_path / name / "timestamps.txt").write_text("".join(lines))
+    list_files(tmp_path / "thermal")[2].unlink()
+    frames = (tmp_path / "visible", tmp_path / "thermal", "--depth", rendered / "depth")
+    rig, out = rendered / "rig.yaml", tmp_path / "out"
+    result = run("register", rig, *frames, "--time-offset", 0.5, "-o", out)
+    assert result.exit_code == 0, result.output
+    assert "1 reference, 0 source frames" in result.stderr
+    names = [path.name for path in list_files(tmp_path / "visible")]
+    assert [path.name for path in list_files(out)] == names[:2] + names[3:]
+    inputs = (rendered / "visible", rendered / "thermal", "--depth", rendered / "depth")
+    assert run("register", rig, *inputs, "-o", tmp_path / "true").exit_code == 0
+    for path in list_files(out):
+        np.testing.assert_array_equal(read_image(path), read_image(tmp_path / "true" / path.name))
+
+
+def test_register_estimates_how_late_the_source_is(tmp_path: Path) -> None:
+    """Both containers start at zero; the source shows ten frames later what happened."""
+    times = np.arange(150) / 30
+    scenes = {
+        "v": Pan(VISIBLE, times, 0, True, 3, 0),
+        "t": Pan(THERMAL, times - 1 / 3, 0, True, 6, 1),
+    }
+    v, t = (
+        write_video(tmp_path / f"{name}.mkv", list(pan), "FFV1", 30) for name, pan in scenes.items()
+    )
+    camera = Pinhole(240, 160, 200, 200, 119.5, 79.5)
+    Rig(camera, camera).save(tmp_path / "rig.yaml")
+    arguments = ("register", tmp_path / "rig.yaml", v, t, "--depth", "plane")
+    result = run(*arguments, "--time-offset", "auto", "-o", tmp_path / "out.mkv")
+    assert result.exit_code == 0, result.output
+    found = re.search(r"clock offset: source late by ([+0-9.]+) s", result.stderr)
+    assert found and float(found[1]) == pytest.approx(1 / 3, abs=0.008)
+    assert "140 pairs by time" in result.stderr
+    assert "10 reference, 10 source frames" in result.stderr
+    # The rig is the identity: what is registered first is the source's eleventh frame.
+    np.testing.assert_array_equal(open_stream(tmp_path / "out.mkv")[0], open_stream(t)[10])
+
+
+def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> None:
+    visible, thermal = rendered / "visible", rendered / "thermal"
+    rest = ("--depth", rendered / "depth", "-o", tmp_path / "o")
+    rig = rendered / "rig.yaml"
+    for arguments, named in (
+        ((visible, thermal, "--time-offset", "soon"), "'soon' is neither `auto` nor a number"),
+        ((visible, thermal, "--time-offset", "1"), "needs frames paired by time; they are by name"),
+        ((visible, thermal, "--time-offset", "auto"), "needs times of both streams"),
+        ((visible, thermal, "--pair", "time"), "reference frames have no times"),
+        ((visible, tmp_path / "no.mp4"), "no.mp4: no such file"),
+        ((visible, f"{thermal}#down"), "thermal#down: expected #TOPIC"),
+    ):
+        assert named in refused("register", rig, *arguments, *rest)
+
+
+def test_pairs_are_streams_of_the_partners(tmp_path: Path) -> None:
+    frames = moving(12)
+    path = write_video(tmp_path / "w.mkv", frames, "FFV1")
+    pairs = open_pairs(f"{path}#left", f"{path}#right")
+    assert len(pairs.references) == len(pairs.sources) == 12
+    np.testing.assert_array_equal(pairs.sources[7], frames[7][:, 80:])
