@@ -21,6 +21,7 @@ import click
 from ._core import CalibrationOptions, Pinhole, Rig
 from .demo import run_demo
 from .depth import PNG_SCALE, PlaneDepth
+from .depth.options import MEASURED_OPTIONS
 from .evaluate import evaluate
 from .frames import (
     Image,
@@ -119,7 +120,8 @@ frames_arguments = options(
         metavar="DEPTH",
         required=True,
         help="Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr in m;"
-        " 0 unknown), or `plane` for a flat road.",
+        " 0 unknown) or lidar scan (.bin, .pcd, .ply), `stereo:FOLDER` of the right camera's"
+        " images, or `plane` for a flat road.",
     ),
     number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256"),
     number(
@@ -141,6 +143,7 @@ frames_arguments = options(
         PlaneDepth.hfov_deg,
         "Plane: horizontal field of view of the reference camera [deg].",
     ),
+    *MEASURED_OPTIONS,
 )
 quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
 threads_option = click.option(

@@ -10,14 +10,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, calibrate, choose_frames
-from .depth import PNG_SCALE, DepthProvider, PlaneDepth, open_depth
+from .depth import PNG_SCALE, DepthProvider, MeasuredDepth, PlaneDepth, open_depth
 from .frames import Image, Images, InputError, fit_rig, open_pairs, overlay, size_of, write_image
 
 T = TypeVar("T")
@@ -49,13 +49,13 @@ class Frames:
         horizon: float = PlaneDepth.horizon,
         far: float = PlaneDepth.far,
         plane_hfov: float = PlaneDepth.hfov_deg,
+        **measured: Any,
     ) -> Frames:
-        """Open frames as the arguments of the commands name them."""
+        """Open frames as the arguments of the commands name them; the rest is `MeasuredDepth`."""
         references, sources = open_pairs(reference, source)
         plane = PlaneDepth(camera_height, horizon, far, plane_hfov)
-        return Frames(
-            references, sources, open_depth(depth_spec, references.paths, depth_scale, plane)
-        )
+        given = references.paths, depth_scale, plane, MeasuredDepth(**measured)
+        return Frames(references, sources, open_depth(depth_spec, *given))
 
     def __len__(self) -> int:
         return len(self.references)
