@@ -1,7 +1,4 @@
-"""Depth made fit for video: edges pulled to those of the image, and steadied in time.
-
-Both are wrappers around any provider, and both are off unless asked for.
-"""
+"""Depth made fit for video: steadied in time, and only where asked for."""
 
 from __future__ import annotations
 
@@ -19,13 +16,6 @@ from .provider import Depth, DepthProvider
 Array = NDArray[Any]
 """float32."""
 
-BAND = 0.006
-"""Reach of a depth edge to either side [of the image width]: how far it may be pulled."""
-STEP = 1.15
-"""Ratio of the two depths that makes an edge."""
-EPSILON = 0.01**2
-"""Regulariser of the guided filter: image variance below this is no edge to pull to."""
-
 MEMORY = 4
 """Frames that a steadied value is the mean of, at most."""
 GATE = 0.04
@@ -34,69 +24,6 @@ MOTION = 0.04
 """Difference of the compressed image from its prediction that starts a pixel anew."""
 PATCH = 5
 """Side of the square that both are averaged over [px]."""
-
-
-@dataclass(frozen=True)
-class SnappedDepth:
-    """Depth of another provider, its edges pulled to edges of the reference image."""
-
-    provider: DepthProvider
-
-    def __call__(self, index: int, reference: Image) -> Depth:
-        return snap(self.provider(index, reference), reference)
-
-
-def snap(depth: Depth, guide: Image) -> Depth:
-    """Decide anew, beside a step in depth, which pixels lie before and which behind it.
-
-    Within a narrow band along each step, near or far is a yes-or-no map; a guided filter moves its
-    border to the image's edge, and half is the threshold. A pixel that changes sides takes the
-    mean inverse depth of its new side, so that no value in between arises. All others, and unknown
-    pixels, stay as they are.
-
-    Parameters
-    ----------
-    depth
-        ``(h, w)`` float32 [m], 0 where unknown.
-    guide
-        Reference image of the same aspect, any size.
-    """
-    reach = max(2, round(BAND * depth.shape[1]))
-    side = (2 * reach + 1, 2 * reach + 1)
-    known = depth > 0
-    inverse = np.zeros(depth.shape, np.float32)
-    np.divide(1, depth, out=inverse, where=known)
-    window = np.ones(side, np.uint8)
-    near = cv2.dilate(inverse, window)
-    far = cv2.erode(np.where(known, inverse, near), window)
-    band = known & (near > STEP * far)
-    if not band.any():
-        return depth
-    before = known & (inverse > np.sqrt(near * far))
-
-    def mean(values: Array, weight: Array) -> Array:
-        mass = cv2.blur(weight, side)
-        total: Array = cv2.blur(values * weight, side)
-        return np.divide(total, mass, out=np.zeros_like(total), where=mass > 1e-6)
-
-    weight = known.astype(np.float32)
-    image, label = compressed(guide, size_of(depth)), before.astype(np.float32)
-    m_image, m_label = mean(image, weight), mean(label, weight)
-    covariance = mean(image * label, weight) - m_image * m_label
-    variance = (mean(image * image, weight) - m_image**2).clip(0)
-    slope = covariance / (variance + EPSILON)
-    offset = m_label - slope * m_image
-    decided = mean(slope, weight) * image + mean(offset, weight) > 0.5
-
-    of_side = np.where(
-        decided,
-        mean(inverse, (known & before).astype(np.float32)),
-        mean(inverse, (known & ~before).astype(np.float32)),
-    )
-    changed = band & (decided != before) & (of_side > 0)
-    snapped = depth.copy()
-    snapped[changed] = 1 / of_side[changed]
-    return snapped
 
 
 @dataclass

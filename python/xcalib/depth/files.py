@@ -106,11 +106,11 @@ def _read_exr(path: Path) -> NDArray[np.generic]:
         raise InputError(f"{path}: no such file")
     try:
         with importlib.import_module("OpenEXR").File(str(path), separate_channels=True) as file:
-            header = file.header()
-            channels = {name: channel.pixels for name, channel in file.channels().items()}
+            windows = [np.array(file.header()[key]) for key in ("dataWindow", "displayWindow")]
+            channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
     except (RuntimeError, ValueError):
         raise InputError(f"{path}: cannot decode, truncated or not an EXR file") from None
-    if not np.array_equal(header["dataWindow"], header["displayWindow"]):
+    if not np.array_equal(windows[0], windows[1]):
         raise InputError(f"{path}: its data window is a part of the image, expected all of it")
     name = next(iter(channels)) if len(channels) == 1 else "Z"
     if name not in channels:

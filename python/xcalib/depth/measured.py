@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..frames import InputError
 from .completion import MIN_CONFIDENCE, CompletedDepth
-from .conditioning import SnappedDepth, SteadyDepth
+from .conditioning import SteadyDepth
 from .lidar import LidarDepth
 from .provider import DepthProvider
 from .stereo import StereoDepth, StereoGeometry, read_stereo_geometry
@@ -33,7 +33,6 @@ class MeasuredDepth:
     complete: bool = False
     completion_confidence: float = MIN_CONFIDENCE
     """Filled pixels below it stay unknown, [0, 1]."""
-    depth_snap: bool = False
     depth_steady: bool = False
 
     def open(self, spec: str, reference_paths: Sequence[Path]) -> DepthProvider | None:
@@ -66,9 +65,9 @@ class MeasuredDepth:
         return StereoGeometry(self.stereo_baseline, self.stereo_focal, self.stereo_doffs or 0.0)
 
     def conditioned(self, provider: DepthProvider) -> DepthProvider:
-        """The provider with what was asked for: steadied, then completed, then snapped."""
+        """The provider with what was asked for: steadied, then completed."""
         if self.depth_steady:
             provider = SteadyDepth(provider)
         if self.complete:
             provider = CompletedDepth(provider, self.completion_confidence)
-        return SnappedDepth(provider) if self.depth_snap else provider
+        return provider

@@ -48,7 +48,6 @@ MEASURED_OPTIONS: tuple[Callable[[Any], Any], ...] = (
         show_default=True,
         help="Complete: filled pixels below this confidence stay unknown, 0 to 1.",
     ),
-    click.option("--depth-snap", is_flag=True, help="Pull depth edges to image edges."),
     click.option(
         "--depth-steady", is_flag=True, help="Average depth over consecutive frames of a video."
     ),

@@ -80,7 +80,8 @@ def disparity(
     images = [np.rint(255 * gray(image).clip(0, 1)).astype(np.uint8) for image in (left, right)]
     forward = _matched(images[0], images[1], lowest, span)
     backward = _matched(images[1][:, ::-1], images[0][:, ::-1], lowest, span)[:, ::-1]
-    there = np.arange(width) - np.rint(np.nan_to_num(forward)).astype(np.intp)
+    nearby = np.rint(np.nan_to_num(forward)).astype(np.intp)
+    there = np.arange(width) - nearby
     inside = (there >= 0) & (there < width)
     rows = np.arange(height)[:, None]
     answer = backward[rows, there.clip(0, width - 1)]
@@ -112,7 +113,7 @@ def _matched(
         for image in (np.ascontiguousarray(left), np.ascontiguousarray(right))
     ]
     fixed = matcher.compute(*wide)[:, margin : margin + left.shape[1]]
-    found = fixed.astype(np.float32) / 16
+    found: NDArray[np.float32] = fixed.astype(np.float32) / np.float32(16)
     found[fixed < 16 * lowest] = np.nan
     return found
 
