@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from pathlib import Path
 
@@ -62,7 +63,8 @@ def test_truncated_npy_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(cv2.haveImageWriter("a.exr"), reason="this OpenCV reads EXR")
-def test_missing_exr_support_is_said(tmp_path: Path) -> None:
+def test_missing_exr_support_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     (tmp_path / "a.exr").write_bytes(b"v/1\x01\x02\x00\x00\x00")
     with pytest.raises(InputError, match=r"a\.exr.*without OpenEXR"):
         read_depth(tmp_path / "a.exr")

@@ -21,6 +21,7 @@ import click
 from ._core import CalibrationOptions, Pinhole, Rig
 from .demo import run_demo
 from .depth import PNG_SCALE, PlaneDepth
+from .depth.options import MEASURED_OPTIONS
 from .evaluate import evaluate
 from .footage import METHODS, camera_infos, is_bag, is_video
 from .frames import (
@@ -134,7 +135,8 @@ frames_arguments = options(
         metavar="DEPTH",
         required=True,
         help="Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr in m;"
-        " 0 unknown), an .onnx file of a network, or `plane` for a flat road.",
+        " 0 unknown) or lidar scan (.bin, .pcd, .ply), `stereo:FOLDER` of the right camera's"
+        " images, an .onnx file of a network, or `plane` for a flat road.",
     ),
     number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256"),
     number(
@@ -184,6 +186,7 @@ frames_arguments = options(
         show_default=True,
         help="Network: execution providers, the preferred first: cuda,cpu.",
     ),
+    *MEASURED_OPTIONS,
 )
 frames_arguments = options(
     frames_arguments,

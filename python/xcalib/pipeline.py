@@ -10,14 +10,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, calibrate, choose_frames
-from .depth import PNG_SCALE, DepthProvider, NetworkOptions, PlaneDepth
+from .depth import PNG_SCALE, DepthProvider, MeasuredDepth, NetworkOptions, PlaneDepth
 from .footage import Matching, Stream, open_pairs, open_sink
 from .footage.pairing import median_period
 from .frames import Image, InputError, fit_rig, overlay, size_of
@@ -64,8 +64,9 @@ class Frames:
         max_gap: float | None = Matching.max_gap,
         reference_times: Path | None = None,
         source_times: Path | None = None,
+        **measured: Any,
     ) -> Frames:
-        """Open frames as the arguments of the commands name them."""
+        """Open frames as the arguments of the commands name them; the rest is `MeasuredDepth`."""
         matching = Matching(pairing, time_offset, max_gap, reference_times, source_times)
         pairs = open_pairs(reference, source, matching)
         plane = PlaneDepth(camera_height, horizon, far, plane_hfov)
@@ -77,7 +78,8 @@ class Frames:
             tuple(name.strip() for name in providers.split(",")),
             threads,
         )
-        depth = pairs.open_depth(depth_spec, depth_scale, plane, network)
+        given = depth_scale, plane, network, MeasuredDepth(**measured)
+        depth = pairs.open_depth(depth_spec, *given)
         return Frames(pairs.references, pairs.sources, depth, pairs.notes)
 
     def __len__(self) -> int:

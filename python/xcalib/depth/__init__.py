@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ..frames import InputError
 from .files import DEPTH_SUFFIXES, PNG_SCALE, FolderDepth, read_depth
+from .measured import MeasuredDepth
 from .network import NetworkDepth, NetworkOptions
 from .plane import PlaneDepth
 from .provider import Depth, DepthProvider
@@ -22,6 +23,7 @@ __all__ = [
     "Depth",
     "DepthProvider",
     "FolderDepth",
+    "MeasuredDepth",
     "NetworkDepth",
     "NetworkOptions",
     "PlaneDepth",
@@ -36,6 +38,7 @@ def open_depth(
     scale: float = PNG_SCALE,
     plane: PlaneDepth | None = None,
     network: NetworkOptions | None = None,
+    measured: MeasuredDepth | None = None,
 ) -> DepthProvider:
     """The depth provider that a ``--depth`` argument names.
 
@@ -43,7 +46,8 @@ def open_depth(
     ----------
     spec
         A folder of depth maps, the .onnx file of a network, or the word ``plane`` (a folder of
-        that name: ``./plane``).
+        that name: ``./plane``); a folder of lidar scans or ``stereo:FOLDER`` with the options of
+        ``measured`` for them.
     reference_paths
         Files of the reference images, in the order of the frames.
     scale
@@ -52,7 +56,23 @@ def open_depth(
         The prior used for ``plane``.
     network
         How to run a network.
+    measured
+        Lidar, stereo, completion and conditioning.
     """
+    measured = measured or MeasuredDepth()
+    provider = measured.open(str(spec), reference_paths)
+    if provider is None:
+        provider = _open_given(spec, reference_paths, scale, plane, network)
+    return measured.conditioned(provider)
+
+
+def _open_given(
+    spec: str | Path,
+    reference_paths: Sequence[Path],
+    scale: float,
+    plane: PlaneDepth | None,
+    network: NetworkOptions | None,
+) -> DepthProvider:
     if str(spec) == "plane":
         return plane or PlaneDepth()
     if Path(spec).suffix.lower() == ".onnx" and not Path(spec).is_dir():

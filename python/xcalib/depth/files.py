@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import math
 import os
 from collections.abc import Sequence
@@ -84,13 +86,35 @@ def _read_values(path: Path) -> NDArray[np.generic]:
             raise InputError(f"{path}: cannot decode, truncated or not a .npy array") from None
         return np.asarray(values)
     if suffix == ".exr":
+        if importlib.util.find_spec("OpenEXR"):
+            return _read_exr(path)
         # OpenCV reads EXR only on request, and its pip wheels are built without it.
         os.environ.setdefault("OPENCV_IO_ENABLE_OPENEXR", "1")
         try:
             return decode(path)
         except InputError as error:
             raise InputError(
-                f"{error}, or this OpenCV is built without OpenEXR (as the pip wheels are);"
-                " .npy and .tiff in metres are read everywhere"
+                f"{error}, or this OpenCV is built without OpenEXR (as the pip wheels are):"
+                " install xcalib-rgbt[exr]; .npy and .tiff in metres are read everywhere"
             ) from None
     return decode(path)
+
+
+def _read_exr(path: Path) -> NDArray[np.generic]:
+    """The only channel of an EXR file, or the one named Z, by the optional package OpenEXR."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    try:
+        with importlib.import_module("OpenEXR").File(str(path), separate_channels=True) as file:
+            windows = [np.array(file.header()[key]) for key in ("dataWindow", "displayWindow")]
+            channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+    except (RuntimeError, ValueError):
+        raise InputError(f"{path}: cannot decode, truncated or not an EXR file") from None
+    if not np.array_equal(windows[0], windows[1]):
+        raise InputError(f"{path}: its data window is a part of the image, expected all of it")
+    name = next(iter(channels)) if len(channels) == 1 else "Z"
+    if name not in channels:
+        raise InputError(
+            f"{path}: channels are {', '.join(channels)}, expected only one, or one named Z"
+        )
+    return np.asarray(channels[name])

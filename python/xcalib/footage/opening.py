@@ -13,10 +13,12 @@ from ..depth import (
     PNG_SCALE,
     Depth,
     DepthProvider,
+    MeasuredDepth,
     NetworkOptions,
     PlaneDepth,
     open_depth,
 )
+from ..depth.points import POINT_SUFFIXES
 from ..frames import Image, InputError, list_files
 from .offset import estimate_offset
 from .pairing import Pairing, match_depths, pair_streams
@@ -76,17 +78,20 @@ class Pairs:
         scale: float = PNG_SCALE,
         plane: PlaneDepth | None = None,
         network: NetworkOptions | None = None,
+        measured: MeasuredDepth | None = None,
     ) -> DepthProvider:
         """Depth of `references`; of a folder the files that `match_depths` finds."""
         used, folder = self.pairing.references, Path(spec)
+        given = scale, plane, network, measured
         if spec == "plane" or not folder.is_dir():
             stream = self.all_references
             paths = [Path(f"{stream.name(index)}.png") for index in range(len(stream))]
-            provider = open_depth(spec, getattr(stream, "paths", paths), scale, plane, network)
+            provider = open_depth(spec, getattr(stream, "paths", paths), *given)
             return PickedDepth(provider, used.tolist())
-        files = list_files(folder, DEPTH_SUFFIXES)
+        scans = measured is not None and measured.lidar_calibration is not None
+        files = list_files(folder, POINT_SUFFIXES if scans else DEPTH_SUFFIXES)
         matched = match_depths(self.all_references, used, files, folder)
-        return PickedDepth(open_depth(spec, files, scale), matched)
+        return PickedDepth(open_depth(spec, files, *given), matched)
 
 
 def _picked(stream: Stream, indices: NDArray[np.intp]) -> Stream:
