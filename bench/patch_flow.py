@@ -103,8 +103,9 @@ def shifted_pairs(count: int) -> None:
     if folder is None:
         return
     names = sorted(p.name for p in (folder / "visible").iterdir())[:: max(1, 221 // count)]
+    unshifted = {}
     for offset in (0, 4, 12):
-        tally = Tally()
+        against_truth, against_own = Tally(), Tally()
         for i, name in enumerate(names):
             visible = gray(cv2.imread(str(folder / "visible" / name)))
             thermal = gray(cv2.imread(str(folder / "thermal" / name), cv2.IMREAD_UNCHANGED))
@@ -115,9 +116,14 @@ def shifted_pairs(count: int) -> None:
             warped = cv2.warpAffine(thermal, move, size)
             mask = cv2.warpAffine(np.ones_like(thermal), move, size) > 0.999
             flow, confidence = patch_flow(visible, warped, mask)
-            truth = np.broadcast_to(np.float32([dx, dy]), flow.shape)
-            tally.add(flow, confidence, truth, mask)
-        print(f"aligned real pairs ({len(names)}), shifted by {offset:2} px: {tally}")
+            shift = np.float32([dx, dy])
+            against_truth.add(flow, confidence, np.broadcast_to(shift, flow.shape), mask)
+            # What the pair's own misalignment is does not change by a shift.
+            own, sure = unshifted.setdefault(name, (flow, confidence))
+            against_own.add(flow, confidence, own + shift, mask & (sure >= CONFIDENT))
+        print(f"aligned real pairs ({len(names)}), shifted by {offset:2} px: {against_truth}")
+        if offset:
+            print(f"    against the flow of the pair as it is: {against_own}")
 
 
 def night_rig() -> None:

@@ -4,6 +4,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-for name in ("register_frame", "night_rig", "flir_rig", "synthetic_rigs"):
+for name in ("register_frame", "night_rig", "flir_rig", "synthetic_rigs", "patch_flow"):
     print(f"== {name}", flush=True)
     subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)
