@@ -135,10 +135,12 @@ Edges warped_by(const Edges& edges, const cv::Mat& flow_x, const cv::Mat& flow_y
     return out;
 }
 
+constexpr float kUnknown = -2.0f;
+
 // One plane of values, one for each cell, for each shift.
 struct Volume {
     int radius = 0;
-    std::vector<cv::Mat> score;  // (2 radius + 1)^2, row by row, in [-1, 1]
+    std::vector<cv::Mat> score;  // (2 radius + 1)^2, row by row, in [-1, 1], or kUnknown
 
     const cv::Mat& at(int dx, int dy) const {
         return score[(dy + radius) * (2 * radius + 1) + dx + radius];
@@ -234,7 +236,7 @@ Volume correlate(const Edges& a, const Edges& b, int radius, const FlowOptions& 
                 const float norm =
                     a_energy.at<float>(row, column) * b_energy.at<float>(row, column);
                 const bool known = both.at<float>(row, column) > kEnough * step * step;
-                value = known && norm > 1e-8f ? value / std::sqrt(norm) : -1.0f;
+                value = known && norm > 1e-8f ? value / std::sqrt(norm) : kUnknown;
             }
         volume.score[index] = cross;
     });
@@ -253,7 +255,7 @@ Peak best_shift(const Volume& volume, int column, int row) {
     const int r = volume.radius;
     const auto score = [&](int dx, int dy) { return volume.at(dx, dy).at<float>(row, column); };
     int bx = 0, by = 0;
-    float best = -1;
+    float best = kUnknown;
     for (int dy = -r; dy <= r; ++dy)
         for (int dx = -r; dx <= r; ++dx)
             if (score(dx, dy) > best) {
@@ -274,6 +276,10 @@ Peak best_shift(const Volume& volume, int column, int row) {
             if (std::max(std::abs(dx - bx), std::abs(dy - by)) > kOwn)
                 elsewhere = std::max(elsewhere, score(dx, dy));
     peak.margin = best - elsewhere;
+    // A neighbour without enough valid pixels has no value to put a paraboloid through.
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+            if (score(bx + dx, by + dy) == kUnknown) return peak;
     // The paraboloid through the nine values around the peak.
     const auto at = [&](int dx, int dy) { return score(bx + dx, by + dy); };
     const float gx = 0.5f * (at(1, 0) - at(-1, 0)), gy = 0.5f * (at(0, 1) - at(0, -1));
@@ -363,6 +369,7 @@ FlowField one_way(const Pyramid& a, const Pyramid& b, const FlowOptions& options
                 const Peak peak = best_shift(volume, column, row);
                 field.x[i] = flow_x.at<float>(y, x) + peak.x;
                 field.y[i] = flow_y.at<float>(y, x) + peak.y;
+                // Height, texture in both directions, distinctness; and all that at coarser levels.
                 float told = ramp(peak.height, 0.1f, 0.4f) * ramp(peak.curvature, 0.0f, 0.03f);
                 if (radius > kFine) told *= ramp(peak.margin, 0.0f, 0.1f);
                 field.confidence[i] = std::sqrt(told * sure.at<float>(y, x));
