@@ -261,19 +261,3 @@ def test_networks_of_another_kind_are_refused(build: Build, tmp_path: Path) -> N
         NetworkFlow(no_flow)(image, image[:, :10], None)
     with pytest.raises(InputError, match="flow tolerance is 0, expected above 0 px"):
         NetworkFlow(no_flow, tolerance=0)
-
-
-def test_raft_of_torchvision(tmp_path: Path) -> None:
-    """The signature of a real network, with random weights: it runs, and is finite."""
-    torch = pytest.importorskip("torch")
-    models = pytest.importorskip("torchvision.models.optical_flow")
-    pytest.importorskip("onnxruntime")
-    path = tmp_path / "raft.onnx"
-    inputs = tuple(torch.zeros(1, 3, 128, 160) for _ in range(2))
-    network = models.raft_small(weights=None, num_flow_updates=2).eval()
-    torch.onnx.export(network, inputs, path, opset_version=17, dynamo=False)
-    path.with_suffix(".yaml").write_text("range: [-1, 1]\n")
-    reference = texture(160, 120)
-    flow, confidence = NetworkFlow(path)(reference, shifted(reference), None)
-    assert flow.shape == (120, 160, 2) and np.isfinite(flow).all()
-    assert confidence.min() >= 0 and confidence.max() <= 1
