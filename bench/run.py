@@ -11,6 +11,7 @@ for name in (
     "synthetic_rigs",
     "depth_completion",
     "depth_conditioning",
+    "patch_flow",
 ):
     print(f"== {name}", flush=True)
     subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)

@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "xcalib/calibrate.hpp"
+#include "xcalib/flow.hpp"
 #include "xcalib/metrics.hpp"
 #include "xcalib/nec.hpp"
 #include "xcalib/register.hpp"
@@ -591,4 +592,49 @@ only, as the authors' code) or "printed" (Eq. (gradient_clamping) as printed).)"
         py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(),
         "(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches that tell; see "
         "metrics.patch_residual().");
+
+    py::class_<FlowOptions>(m, "FlowOptions", "Options of patch_flow().")
+        .def(py::init(&options_from<FlowOptions>))
+        .def_readwrite("step", &FlowOptions::step, "Of the grid of patches [px], odd, >= 3.")
+        .def_readwrite("patch", &FlowOptions::patch,
+                       "Side of a patch [px], an odd multiple of the step.")
+        .def_readwrite("levels", &FlowOptions::levels, "Of the pyramid, >= 1.")
+        .def_readwrite("max_shift", &FlowOptions::max_shift,
+                       "Farthest shift that the coarsest level looks for [px], >= 1.")
+        .def("validate", &FlowOptions::validate,
+             "Raises ValueError naming the field, its value and the allowed range.");
+
+    m.def(
+        "patch_flow",
+        [](const py::object& a, const py::object& b, const py::object& mask,
+           const FlowOptions& options, int num_threads) {
+            const Compared c = compared(a, b, mask);
+            const int width = c.reference.width, height = c.reference.height;
+            py::array_t<float> flow({height, width, 2}), confidence({height, width});
+            float* const vectors = flow.mutable_data();
+            float* const sure = confidence.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                const FlowField field =
+                    patch_flow(c.reference, c.registered, c.valid, options, num_threads);
+                const Image x = at_every_pixel(field, field.x, width, height);
+                const Image y = at_every_pixel(field, field.y, width, height);
+                for (std::size_t i = 0; i < x.pixels.size(); ++i) {
+                    vectors[2 * i] = x.pixels[i];
+                    vectors[2 * i + 1] = y.pixels[i];
+                }
+                const Image told = at_every_pixel(field, field.confidence, width, height);
+                std::copy(told.pixels.begin(), told.pixels.end(), sure);
+            }
+            return py::make_tuple(flow, confidence);
+        },
+        py::arg("reference"), py::arg("warped"), py::arg("mask") = py::none(),
+        py::arg("options") = FlowOptions{}, py::arg("num_threads") = 0,
+        R"(Residual flow between a reference and a warped source of another modality.
+
+Images (H, W) or (H, W, 3) of one size; mask (H, W), nonzero where the warped source is valid.
+Returns (flow, confidence): flow (H, W, 2) float32 [px], what reference pixel p shows is found at
+p + flow[p] in the warped source; confidence (H, W) float32 in [0, 1]. Both are linear between the
+grid's points. num_threads: 0 uses every core; the result does not depend on it.
+Raises ValueError with shapes and dtypes.)");
 }

@@ -371,3 +371,34 @@ def patch_shifts(
     """(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches that tell; see
     metrics.patch_residual().
     """
+
+class FlowOptions:
+    """Options of patch_flow()."""
+
+    step: int
+    """Of the grid of patches [px], odd, >= 3."""
+    patch: int
+    """Side of a patch [px], an odd multiple of the step."""
+    levels: int
+    """Of the pyramid, >= 1."""
+    max_shift: int
+    """Farthest shift that the coarsest level looks for [px], >= 1."""
+    def __init__(self, **kwargs: Any) -> None: ...
+    def validate(self) -> None:
+        """Raises ValueError naming the field, its value and the allowed range."""
+
+def patch_flow(
+    reference: NDArray[Any],
+    warped: NDArray[Any],
+    mask: NDArray[Any] | None = None,
+    options: FlowOptions = ...,
+    num_threads: int = 0,
+) -> tuple[NDArray[float32], NDArray[float32]]:
+    """Residual flow between a reference and a warped source of another modality.
+
+    Images (H, W) or (H, W, 3) of one size; mask (H, W), nonzero where the warped source is
+    valid. Returns (flow, confidence): flow (H, W, 2) float32 [px], what reference pixel p
+    shows is found at p + flow[p] in the warped source; confidence (H, W) float32 in [0, 1].
+    Both are linear between the grid's points. num_threads: 0 uses every core; the result does
+    not depend on it. Raises ValueError with shapes and dtypes.
+    """
