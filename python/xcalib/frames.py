@@ -34,6 +34,10 @@ class InputError(ValueError):
     """Input that cannot be used; the message names the file or argument and what was expected."""
 
 
+class DecodeError(InputError):
+    """A file that cannot be decoded: truncated, or not what its name says."""
+
+
 # -- Names ---------------------------------------------------------------------------------------
 
 
@@ -141,7 +145,7 @@ def read_image(path: str | Path) -> Image:
 
 
 def decode(path: Path) -> Image:
-    """Decode an image file with all its channels, or raise `InputError` naming the file."""
+    """Decode an image file with all its channels, or raise `DecodeError` naming the file."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     data = path.read_bytes()
@@ -156,7 +160,7 @@ def decode(path: Path) -> Image:
     finally:
         cv2.utils.logging.setLogLevel(level)
     if image is None:
-        raise InputError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
+        raise DecodeError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
     return image
 
 
@@ -180,10 +184,16 @@ def size_of(image: Image) -> Size:
 
 
 class Images(Sequence[Image]):
-    """The images of a list of files, read at the moment of access, all of one size."""
+    """The images of a list of files, read at the moment of access, all of one size.
 
-    def __init__(self, paths: Sequence[Path]) -> None:
+    ``convert`` is applied to each as it is read, if given.
+    """
+
+    def __init__(
+        self, paths: Sequence[Path], convert: Callable[[Image], Image] | None = None
+    ) -> None:
         self.paths = list(paths)
+        self._convert = convert
         self._first: tuple[Path, Size] | None = None
 
     def __len__(self) -> int:
@@ -195,7 +205,7 @@ class Images(Sequence[Image]):
     def __getitem__(self, index: slice) -> Images: ...
     def __getitem__(self, index: int | slice) -> Image | Images:
         if isinstance(index, slice):
-            return Images(self.paths[index])
+            return Images(self.paths[index], self._convert)
         path = self.paths[index]
         image = read_image(path)
         size = size_of(image)
@@ -207,7 +217,11 @@ class Images(Sequence[Image]):
                 f"{path} is {size[0]}x{size[1]}, expected {expected[0]}x{expected[1]}"
                 f" as {first.name}"
             )
-        return image
+        return self._convert(image) if self._convert else image
+
+    def converted(self, convert: Callable[[Image], Image]) -> Images:
+        """The same files, each image passed through ``convert`` as it is read."""
+        return Images(self.paths, convert)
 
     def __iter__(self) -> Iterator[Image]:
         return (self[index] for index in range(len(self)))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frames import Image, InputError, decode, list_files, pair, same_aspect, size_of
+from ..frames import DecodeError, Image, InputError, decode, list_files, pair, same_aspect, size_of
 from .provider import Depth
 
 DEPTH_SUFFIXES = (".png", ".npy", ".tif", ".tiff", ".exr")
@@ -81,7 +81,7 @@ def _read_values(path: Path) -> NDArray[np.generic]:
         try:
             values = np.load(path, allow_pickle=False)
         except (ValueError, EOFError):
-            raise InputError(f"{path}: cannot decode, truncated or not a .npy array") from None
+            raise DecodeError(f"{path}: cannot decode, truncated or not a .npy array") from None
         return np.asarray(values)
     if suffix == ".exr":
         # OpenCV reads EXR only on request, and its pip wheels are built without it.
