@@ -143,7 +143,7 @@ def _candidate(index: int, read: Read) -> Candidate:
     try:
         reference, source, depth = read(index)
     except DecodeError as error:
-        return Candidate(index, f"cannot be read: {error}")
+        return Candidate(index, str(error))
     dark = gray(reference)
     if reference.dtype != np.float32:
         # As the objective does, for the edges of a night image lie in its darkest tenth.

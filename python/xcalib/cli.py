@@ -338,7 +338,9 @@ def calibrate_command(
             click.echo(choice.table(lambda index: frames.references.paths[index].name))
         if choice.unusable:
             first = choice.unusable[0]
-            why = f"{frames.references.paths[first.index]}: {first.reason}"
+            # What cannot be decoded names its file.
+            named = "" if first.fields is None else f"{frames.references.paths[first.index]}: "
+            why = named + first.reason
             if not choice.indices:
                 raise InputError(f"none of {len(choice.candidates)} frames can be used; {why}")
             warn(left_out(len(choice.unusable), why))
