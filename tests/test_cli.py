@@ -310,15 +310,13 @@ def test_truncated_image(scene: Path, rendered: Path, kind: str, command: str) -
     assert sorted(scene.parent.rglob("*")) == before
 
 
-def test_truncated_jpeg(scene: Path, rendered: Path, refused: Refused) -> None:
+def test_truncated_jpeg(scene: Path, refused: Refused) -> None:
     for path in files(scene / "visible"):
         write_image(path.with_suffix(".JPG"), read_image(path))
         path.unlink()
     path = files(scene / "visible")[3]
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 3 // 4])
-    rig = synthetic.demo_rig()
-    rig.save(scene / "rig.yaml")
-    line = refused("register", scene / "rig.yaml", *folders(scene), "-o", scene.parent / "out")
+    line = refused("evaluate", scene / "rig.yaml", *folders(scene))
     assert f"{path}: cannot decode" in line
 
 

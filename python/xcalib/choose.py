@@ -39,6 +39,8 @@ PRIOR = 0.1
 """What is known beforehand, as a share of what one frame tells."""
 FLAT = 0.15
 """Edges below this share of the median frame's: a closed shutter, or no light at all."""
+CONSTANT = 1e-6
+"""Edges below this, in the image's units, are rounding: a constant image."""
 SATURATED = 0.5
 """Share of pixels at the end of the range from which an image is not used."""
 DISAGREES = 0.25
@@ -218,7 +220,8 @@ def _leave_bad_images(candidates: list[Candidate]) -> None:
             return
         usual = float(np.median([candidate.edges[camera] for candidate in usable]))
         for candidate in usable:
-            if candidate.usable and not candidate.edges[camera] > FLAT * usual:
+            least = max(FLAT * usual, CONSTANT)
+            if candidate.usable and not candidate.edges[camera] > least:
                 candidate.reason = f"{name} is flat"
     groups: dict[bytes, list[Candidate]] = {}
     for candidate in candidates:
