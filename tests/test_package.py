@@ -26,8 +26,13 @@ def test_the_version_stands_in_pyproject_alone() -> None:
 
 def test_the_wheel_holds_the_package_and_nothing_else() -> None:
     installed = {PurePosixPath(path) for path in files(DISTRIBUTION) or []}
-    inside = {path.name for path in installed if path.parts[0] == "xcalib"}
-    sources = {path.name for path in (ROOT / "python" / "xcalib").iterdir() if path.is_file()}
+    inside = {str(path.relative_to("xcalib")) for path in installed if path.parts[0] == "xcalib"}
+    root = ROOT / "python" / "xcalib"
+    sources = {
+        path.relative_to(root).as_posix()
+        for path in root.rglob("*")
+        if path.is_file() and path.suffix in (".py", ".pyi", ".typed")
+    }
     module = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
     assert {path for path in inside if not path.endswith(".pyc")} == sources | {module}
     assert {"py.typed", "_core.pyi"} <= inside

@@ -462,8 +462,11 @@ see CalibrationResult.converged.)");
 
     py::class_<Registrar>(m, "Registrar", R"(One rig, a stream of frames, Eq. (warping).
 
-num_threads: 0 uses every core. Raises ValueError where the rig is not valid.)")
-        .def(py::init<const Rig&, int>(), py::arg("rig"), py::arg("num_threads") = 0)
+num_threads: 0 uses every core. nearest: register() takes the source pixel next to the point as it
+is, instead of interpolating between four, so that radiometric counts are never mixed. Raises
+ValueError where the rig is not valid.)")
+        .def(py::init<const Rig&, int, bool>(), py::arg("rig"), py::arg("num_threads") = 0,
+             py::arg("nearest") = false)
         .def_property_readonly("rig", &Registrar::rig, "A copy of the rig.",
                                py::return_value_policy::copy)
         .def(

@@ -44,25 +44,44 @@ void sample_row(const ImageView& source, const float* u, const float* v,
     }
 }
 
+// The pixel whose centre is next, as it is: counts of a radiometric source are never mixed.
+template <class T, int kChannels>
+void sample_row_nearest(const ImageView& source, const float* u, const float* v,
+                        const std::uint8_t* validity, int width, T* out) {
+    for (int x = 0; x < width; ++x, out += kChannels) {
+        if (validity[x] != static_cast<std::uint8_t>(Validity::valid)) {
+            for (int c = 0; c < kChannels; ++c) out[c] = T{0};
+            continue;
+        }
+        const int x0 = static_cast<int>(u[x] + 0.5f), y0 = static_cast<int>(v[x] + 0.5f);
+        const char* row = static_cast<const char*>(source.data) + y0 * source.row_bytes;
+        const T* pixel = reinterpret_cast<const T*>(row) + kChannels * x0;
+        for (int c = 0; c < kChannels; ++c) out[c] = pixel[c];
+    }
+}
+
 using RowSampler = void (*)(const ImageView&, const float*, const float*, const std::uint8_t*, int,
                             void*);
 
-template <class T, int kChannels>
+template <class T, int kChannels, bool kNearest>
 void sample_row_erased(const ImageView& source, const float* u, const float* v,
                        const std::uint8_t* validity, int width, void* out) {
-    sample_row<T, kChannels>(source, u, v, validity, width, static_cast<T*>(out));
+    const auto sample = kNearest ? sample_row_nearest<T, kChannels> : sample_row<T, kChannels>;
+    sample(source, u, v, validity, width, static_cast<T*>(out));
 }
 
-RowSampler row_sampler(PixelType type, int channels) {
-    const bool colour = channels == 3;
+template <class T>
+RowSampler row_sampler(int channels, bool nearest) {
+    if (channels == 3)
+        return nearest ? sample_row_erased<T, 3, true> : sample_row_erased<T, 3, false>;
+    return nearest ? sample_row_erased<T, 1, true> : sample_row_erased<T, 1, false>;
+}
+
+RowSampler row_sampler(PixelType type, int channels, bool nearest) {
     switch (type) {
-        case PixelType::u8:
-            return colour ? sample_row_erased<std::uint8_t, 3> : sample_row_erased<std::uint8_t, 1>;
-        case PixelType::u16:
-            return colour ? sample_row_erased<std::uint16_t, 3>
-                          : sample_row_erased<std::uint16_t, 1>;
-        case PixelType::f32:
-            return colour ? sample_row_erased<float, 3> : sample_row_erased<float, 1>;
+        case PixelType::u8: return row_sampler<std::uint8_t>(channels, nearest);
+        case PixelType::u16: return row_sampler<std::uint16_t>(channels, nearest);
+        case PixelType::f32: return row_sampler<float>(channels, nearest);
     }
     throw std::invalid_argument("unknown pixel type");
 }
@@ -77,8 +96,9 @@ void require_size(const char* name, int width, int height, const Pinhole& camera
 
 }  // namespace
 
-Registrar::Registrar(const Rig& rig, int num_threads)
-    : rig_((rig.validate(), rig)), reprojection_(rig), num_threads_(num_threads) {
+Registrar::Registrar(const Rig& rig, int num_threads, bool nearest)
+    : rig_((rig.validate(), rig)), reprojection_(rig), num_threads_(num_threads),
+      nearest_(nearest) {
     if (num_threads < 0)
         throw std::invalid_argument("num_threads is " + std::to_string(num_threads) +
                                     ", expected 0 (every core) or more");
@@ -122,7 +142,7 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
         throw std::invalid_argument("registered must have the source's pixel type and channels");
     Image room;
     const ImageView grid = on_reference_grid(depth, room);
-    const RowSampler sample = row_sampler(source.type, source.channels);
+    const RowSampler sample = row_sampler(source.type, source.channels, nearest_);
     parallel_ranges(grid.height, num_threads_, [&](int begin, int end) {
         std::vector<float> u(grid.width), v(grid.width);
         for (int y = begin; y < end; ++y) {

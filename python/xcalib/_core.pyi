@@ -291,9 +291,11 @@ def calibrate(
 class Registrar:
     """One rig, a stream of frames, Eq. (warping).
 
-    num_threads: 0 uses every core. Raises ValueError where the rig is not valid.
+    num_threads: 0 uses every core. nearest: register() takes the source pixel next to the point
+    as it is, instead of interpolating between four, so that radiometric counts are never mixed.
+    Raises ValueError where the rig is not valid.
     """
-    def __init__(self, rig: Rig, num_threads: int = 0) -> None: ...
+    def __init__(self, rig: Rig, num_threads: int = 0, nearest: bool = False) -> None: ...
     @property
     def rig(self) -> Rig:
         """A copy of the rig."""

@@ -34,7 +34,15 @@ from .frames import (
 )
 from .inspection import as_lines, describe
 from .models_command import models
-from .pipeline import Frames, progress, run_calibration, run_registration, save_rig
+from .pipeline import (
+    Frames,
+    choose_by_content,
+    left_out,
+    progress,
+    run_calibration,
+    run_registration,
+    save_rig,
+)
 
 FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
 DEFAULTS = CalibrationOptions()
@@ -240,6 +248,14 @@ threads_option = click.option(
     show_default=True,
     help="Threads to use; 0 means all cores.",
 )
+colormap_option = click.option(
+    "--source-colormap",
+    metavar="MAP",
+    default="auto",
+    show_default=True,
+    help="False-colour source images: turn them back to numbers if they are (auto), never (none),"
+    " or by a map of that name (inferno, jet, iron, ...).",
+)
 rig_argument = click.argument("rig_file", metavar="RIG", type=click.Path(path_type=Path))
 
 
@@ -277,7 +293,7 @@ def cli() -> None:
     type=click.IntRange(min=1),
     default=DEFAULTS.max_frames,
     show_default=True,
-    help="Frames to use at most, drawn by the seed.",
+    help="Frames to use at most.",
 )
 @click.option(
     "--seed",
@@ -287,6 +303,17 @@ def cli() -> None:
     show_default=True,
     help="Seed of the frame choice.",
 )
+@click.option(
+    "--choose",
+    type=click.Choice(["informed", "spread"]),
+    default="informed",
+    show_default=True,
+    help="Frames by what they say about the rig (looks at 4 N), or spread over the footage.",
+)
+@click.option(
+    "--explain", is_flag=True, help="Print why each frame was taken or left (--choose informed)."
+)
+@colormap_option
 @threads_option
 @click.option(
     "--initial",
@@ -347,6 +374,9 @@ def calibrate_command(
     output: Path,
     max_frames: int,
     seed: int,
+    choose: str,
+    explain: bool,
+    source_colormap: str,
     threads: int,
     initial: Path | None,
     search: str,
@@ -368,6 +398,8 @@ def calibrate_command(
             "--reference-intrinsics are kept; expected no --reference-hfov or"
             " --optimize-reference with them"
         )
+    if explain and choose != "informed":
+        raise click.UsageError("--explain tells of --choose informed, expected that too")
     calibration = CalibrationOptions(
         max_frames=max_frames,
         seed=seed,
@@ -389,8 +421,25 @@ def calibrate_command(
     check_file_writable(output)
     if report_file:
         check_file_writable(report_file)
+    frames = with_scalar_sources(frames, source_colormap)
 
-    result, chosen = run_calibration(frames, calibration, initial_rig, quiet, set_cameras)
+    indices = None
+    if choose == "informed":
+        choice = choose_by_content(frames, max_frames, seed, quiet)
+        if explain:
+            click.echo(choice.table(lambda index: frames.references.name(index)))
+        if choice.unusable:
+            first = choice.unusable[0]
+            # What cannot be decoded names its file.
+            named = "" if first.fields is None else f"{frames.references.where(first.index)}: "
+            why = named + first.reason
+            if not choice.indices:
+                raise InputError(f"none of {len(choice.candidates)} frames can be used; {why}")
+            warn(left_out(len(choice.unusable), why))
+        indices = choice.indices
+    result, chosen = run_calibration(
+        frames, calibration, initial_rig, quiet, set_cameras, indices, warn
+    )
     save_rig(result.rig, output)
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")
@@ -401,6 +450,19 @@ def calibrate_command(
         click.echo(f"report: {report_file}")
     if not result.converged:
         stop(NOT_TRUSTED, result.report.message)
+
+
+def with_scalar_sources(frames: Frames, colormap: str) -> Frames:
+    """The frames with false colour turned back to numbers, said on stderr."""
+    frames, line = frames.with_scalar_sources(colormap)
+    if line:
+        click.echo(line, err=True)
+    return frames
+
+
+def warn(message: str) -> None:
+    """One line on stderr; the command goes on."""
+    click.echo(f"warning: {' '.join(message.split())}", err=True)
 
 
 def write_json(path: Path, document: dict[str, Any]) -> None:
@@ -433,10 +495,22 @@ def finite(value: Any) -> Any:
     " .avi (8 bit), .mkv (without loss, gray also 16 bit), and its masks.",
 )
 @click.option("--overlay", "overlays", is_flag=True, help="Also write red-cyan overlays/.")
+@click.option(
+    "--nearest",
+    is_flag=True,
+    help="Take the nearest source pixel as it is: radiometric counts are never mixed."
+    "  [default: bilinear]",
+)
 @threads_option
 @quiet_option
 def register_command(
-    rig_file: Path, output: Path, overlays: bool, threads: int, quiet: bool, **inputs: Any
+    rig_file: Path,
+    output: Path,
+    overlays: bool,
+    nearest: bool,
+    threads: int,
+    quiet: bool,
+    **inputs: Any,
 ) -> None:
     """Bring every SOURCE image onto the pixels of its REFERENCE image.
 
@@ -448,7 +522,7 @@ def register_command(
         if Path(inputs[name]).resolve() == output.resolve():
             raise InputError(f"output folder {output} is an input folder, expected another")
     (check_file_writable if is_video(output) else check_folder_writable)(output)
-    total = run_registration(frames, rig, output, threads, overlays, quiet)
+    total = run_registration(frames, rig, output, threads, overlays, quiet, nearest)
     click.echo(f"{total.summary()}: {output}")
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")
@@ -475,16 +549,24 @@ def register_command(
     type=click.Path(path_type=Path),
     help="Also write all scores, frame by frame (JSON).",
 )
+@colormap_option
 @threads_option
 @quiet_option
 def evaluate_command(
-    rig_file: Path, width: int, json_file: Path | None, threads: int, quiet: bool, **inputs: Any
+    rig_file: Path,
+    width: int,
+    json_file: Path | None,
+    source_colormap: str,
+    threads: int,
+    quiet: bool,
+    **inputs: Any,
 ) -> None:
     """Score the registered SOURCE against REFERENCE, beside the source that is only resized."""
     rig = Rig.load(rig_file)
     frames = open_frames(inputs, threads)
     if json_file:
         check_file_writable(json_file)
+    frames = with_scalar_sources(frames, source_colormap)
     # Depth wants the reference image too: tee hands it on, so that it is read once.
     references, for_depth = itertools.tee(frames.references)
     result = evaluate(

@@ -34,6 +34,10 @@ class InputError(ValueError):
     """Input that cannot be used; the message names the file or argument and what was expected."""
 
 
+class DecodeError(InputError):
+    """A file that cannot be decoded: truncated, or not what its name says."""
+
+
 # -- Names ---------------------------------------------------------------------------------------
 
 
@@ -141,7 +145,7 @@ def read_image(path: str | Path) -> Image:
 
 
 def decode(path: Path) -> Image:
-    """Decode an image file with all its channels, or raise `InputError` naming the file."""
+    """Decode an image file with all its channels, or raise `DecodeError` naming the file."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     data = path.read_bytes()
@@ -156,7 +160,7 @@ def decode(path: Path) -> Image:
     finally:
         cv2.utils.logging.setLogLevel(level)
     if image is None:
-        raise InputError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
+        raise DecodeError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
     return image
 
 

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import re
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,10 +18,20 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, calibrate, choose_frames
-from .depth import PNG_SCALE, DepthProvider, MeasuredDepth, NetworkOptions, PlaneDepth
+from .choose import Choice, choose_informed
+from .depth import (
+    PNG_SCALE,
+    DepthProvider,
+    FolderDepth,
+    MeasuredDepth,
+    NetworkOptions,
+    PlaneDepth,
+)
 from .footage import Matching, Stream, open_pairs, open_sink
+from .footage.opening import PickedDepth
 from .footage.pairing import median_period
-from .frames import Image, InputError, fit_rig, overlay, size_of
+from .frames import DecodeError, Image, InputError, fit_rig, overlay, size_of
+from .thermal import scalar_sources
 
 T = TypeVar("T")
 
@@ -90,9 +101,32 @@ class Frames:
         reference = self.references[index]
         return reference, self.sources[index], self.depth(index, reference)
 
+    def with_scalar_sources(self, colormap: str) -> tuple[Frames, str]:
+        """The frames with false-colour sources turned back to numbers, and a line on it or ''."""
+        sources, line = scalar_sources(self.sources, colormap)
+        return replace(self, sources=sources), line
+
     def fit(self, rig: Rig) -> Rig:
         """The rig at the size of these frames, which the first one tells."""
         return fit_rig(rig, size_of(self.references[0]), size_of(self.sources[0]))
+
+
+def choose_by_content(frames: Frames, max_frames: int, seed: int, quiet: bool = False) -> Choice:
+    """The frames that say most about the rig, see `choose`. Depth counts where it is cheap."""
+    depth = frames.depth
+    cheap = isinstance(
+        depth.depth if isinstance(depth, PickedDepth) else depth, FolderDepth | PlaneDepth
+    )
+
+    def read(index: int) -> tuple[Image, Image, NDArray[np.float32] | None]:
+        if cheap:
+            return frames.read(index)
+        return frames.references[index], frames.sources[index], None
+
+    def watch(indices: list[int]) -> Iterator[int]:
+        return progress(indices, len(indices), "choosing", quiet)
+
+    return choose_informed(len(frames), max_frames, seed, read, watch)
 
 
 def run_calibration(
@@ -101,14 +135,31 @@ def run_calibration(
     initial: Rig | None = None,
     quiet: bool = False,
     prepare: Callable[[CalibrationOptions, Image, Image], None] | None = None,
+    chosen: Sequence[int] | None = None,
+    warn: Callable[[str], None] = warnings.warn,
 ) -> tuple[CalibrationResult, list[int]]:
-    """Load the chosen frames and calibrate; returns the indices of the frames as well.
+    """Load the chosen frames and calibrate; returns the indices of the frames used as well.
 
-    ``prepare`` completes the options once the images, and so their sizes, are known.
+    ``prepare`` completes the options once the images, and so their sizes, are known. Without
+    ``chosen`` the frames are spread over the footage by the seed. Frames that cannot be decoded
+    are left out, and ``warn`` is told how many; if none is left, `InputError` names the first.
     """
-    chosen = choose_frames(len(frames), calibration.max_frames, calibration.seed)
-    loading = progress(chosen, len(chosen), "loading", quiet)
-    references, sources, depths = zip(*(frames.read(index) for index in loading), strict=True)
+    if chosen is None:
+        chosen = choose_frames(len(frames), calibration.max_frames, calibration.seed)
+    loaded: list[tuple[int, tuple[Image, Image, NDArray[np.float32]]]] = []
+    failures: list[DecodeError] = []
+    for index in progress(chosen, len(chosen), "loading", quiet):
+        try:
+            loaded.append((index, frames.read(index)))
+        except DecodeError as error:
+            failures.append(error)
+    if not loaded:
+        raise failures[0] if failures else InputError("no frame to calibrate on")
+    if failures:
+        warn(left_out(len(failures), str(failures[0])))
+    chosen = [index for index, _ in loaded]
+    references, sources, depths = zip(*(frame for _, frame in loaded), strict=True)
+    del loaded
     if prepare is not None:
         prepare(calibration, references[0], sources[0])
     if initial is not None:
@@ -130,6 +181,11 @@ def run_calibration(
         except ValueError as error:
             raise InputError(_with_file_name(str(error), frames.references, chosen)) from None
     return result, chosen
+
+
+def left_out(count: int, first: str) -> str:
+    """The warning that frames were left out of a calibration."""
+    return f"{count} unusable {'frame is' if count == 1 else 'frames are'} left out; {first}"
 
 
 def _with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str:
@@ -175,12 +231,14 @@ def run_registration(
     threads: int = 0,
     overlays: bool = False,
     quiet: bool = False,
+    nearest: bool = False,
 ) -> Registration:
     """Register frame by frame and write images, masks and, if asked for, overlays.
 
-    ``output`` is a folder, or a video by its suffix, at the rate of the reference.
+    ``output`` is a folder, or a video by its suffix, at the rate of the reference. ``nearest``
+    keeps the source's values as they are instead of interpolating between them.
     """
-    registrar = Registrar(frames.fit(rig), threads)
+    registrar = Registrar(frames.fit(rig), threads, nearest)
     total = Registration()
     start = time.perf_counter()
     with open_sink(output, frame_rate(frames.references)) as sink:

@@ -174,6 +174,63 @@ TEST(Registrar, TheFullRangeOfAnIntegerTypeStaysInRange) {
         EXPECT_EQ(out.values[i], mask[i] == 0 ? 65535 : 0);
 }
 
+// Every output pixel is one of the source's, the one whose centre is nearest.
+template <class T>
+void expect_nearest_pixels_as_they_are(int channels) {
+    const Rig rig = small_rig(13);
+    const Image depth = some_depth(14);
+    std::mt19937 random(15);
+    const Pixels<T> source =
+        random_pixels<T>(random, kSourceWidth, kSourceHeight, channels, /*padding=*/5);
+    Pixels<T> out(kWidth, kHeight, channels, /*padding=*/3);
+    std::vector<std::uint8_t> mask(kWidth * kHeight, 9), expected_mask(mask);
+    Registrar(rig, 2, /*nearest=*/true)
+        .register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
+    Pixels<T> blended(kWidth, kHeight, channels);
+    Registrar(rig, 2).register_frame(source.view(), depth.view(), blended.mutable_view(),
+                                     expected_mask.data());
+    EXPECT_EQ(mask, expected_mask);
+    int valid = 0;
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+            if (mask[y * kWidth + x] != 0) {
+                for (int c = 0; c < channels; ++c) ASSERT_EQ(out.at(x, y, c), T(0));
+                continue;
+            }
+            const Eigen::Vector2d p = mapped(rig, x, y, depth.row(y)[x]);
+            // Float coordinates cannot tell which side of a border between pixels a point is on.
+            const auto to_border = [](double a) { return std::abs(a - std::floor(a) - 0.5); };
+            if (std::min(to_border(p.x()), to_border(p.y())) < 1e-3) continue;
+            ++valid;
+            const int u = static_cast<int>(std::lround(p.x()));
+            const int v = static_cast<int>(std::lround(p.y()));
+            for (int c = 0; c < channels; ++c)
+                ASSERT_EQ(out.at(x, y, c), source.at(u, v, c)) << x << ", " << y;
+        }
+    EXPECT_GT(valid, kWidth * kHeight / 3);
+}
+
+TEST(Registrar, NearestKeepsThePixelsAsTheyAre) {
+    expect_nearest_pixels_as_they_are<std::uint8_t>(1);
+    expect_nearest_pixels_as_they_are<std::uint8_t>(3);
+    expect_nearest_pixels_as_they_are<std::uint16_t>(1);
+    expect_nearest_pixels_as_they_are<std::uint16_t>(3);
+    expect_nearest_pixels_as_they_are<float>(1);
+    expect_nearest_pixels_as_they_are<float>(3);
+}
+
+// The far edge of the image is a pixel centre, not the start of a next cell.
+TEST(Registrar, NearestReachesTheLastPixel) {
+    Pixels<std::uint16_t> source(4, 3, 1), out(4, 3, 1);
+    for (int i = 0; i < 12; ++i) source.values[i] = static_cast<std::uint16_t>(1000 + i);
+    std::vector<std::uint8_t> mask(12);
+    const Registrar registrar(shifted_rig(4, 3, -0.25, -0.25), 1, /*nearest=*/true);
+    registrar.register_frame(source.view(), Image(4, 3, 1.0f).view(), out.mutable_view(),
+                             mask.data());
+    EXPECT_EQ(out.at(3, 2, 0), 1011);
+    EXPECT_EQ(mask[0], 1);
+}
+
 template <class T>
 void expect_identity_is_exact(int channels) {
     std::mt19937 random(4);

@@ -12,8 +12,9 @@ namespace xcalib {
 
 class Registrar {
    public:
-    // num_threads: 0 uses every core. Throws std::invalid_argument where the rig is not valid.
-    explicit Registrar(const Rig& rig, int num_threads = 0);
+    // num_threads: 0 uses every core. nearest: take the pixel next to the point as it is, instead
+    // of interpolating between four. Throws std::invalid_argument where the rig is not valid.
+    explicit Registrar(const Rig& rig, int num_threads = 0, bool nearest = false);
 
     const Rig& rig() const { return rig_; }
 
@@ -34,6 +35,7 @@ class Registrar {
     Rig rig_;
     Reprojection reprojection_;
     int num_threads_;
+    bool nearest_;
 };
 
 }  // namespace xcalib

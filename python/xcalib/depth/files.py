@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frames import Image, InputError, decode, list_files, pair, same_aspect, size_of
+from ..frames import DecodeError, Image, InputError, decode, list_files, pair, same_aspect, size_of
 from .provider import Depth
 
 DEPTH_SUFFIXES = (".png", ".npy", ".tif", ".tiff", ".exr")
@@ -83,7 +83,7 @@ def _read_values(path: Path) -> NDArray[np.generic]:
         try:
             values = np.load(path, allow_pickle=False)
         except (ValueError, EOFError):
-            raise InputError(f"{path}: cannot decode, truncated or not a .npy array") from None
+            raise DecodeError(f"{path}: cannot decode, truncated or not a .npy array") from None
         return np.asarray(values)
     if suffix == ".exr":
         if importlib.util.find_spec("OpenEXR"):

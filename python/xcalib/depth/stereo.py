@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frames import Image, Images, InputError, gray, list_files, pair, size_of
+from ..frames import Image, InputError, gray, list_files, pair, read_image, size_of
 from .provider import Depth
 from .yaml_file import load_yaml
 
@@ -127,14 +127,13 @@ class StereoDepth:
         reference_paths: Sequence[Path],
         geometry: StereoGeometry,
     ) -> None:
-        partners = pair(reference_paths, list_files(folder))
-        self.partners = Images([partner for _, partner in partners])
+        self.paths = [partner for _, partner in pair(reference_paths, list_files(folder))]
         self.geometry = geometry
 
     def __call__(self, index: int, reference: Image) -> Depth:
         g = self.geometry
-        partner = self.partners[index]
-        path = self.partners.paths[index]
+        path = self.paths[index]
+        partner = read_image(path)
         if size_of(partner) != size_of(reference):
             raise InputError(
                 f"{path} is {partner.shape[1]}x{partner.shape[0]}, expected"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import overload
 
@@ -85,6 +85,26 @@ class Picked(Stream):
 
     def where(self, index: int) -> str:
         return self.stream.where(self.indices[index])
+
+
+class Converted(Stream):
+    """A stream whose frames are passed through ``convert`` as they are read."""
+
+    def __init__(self, stream: Stream, convert: Callable[[Image], Image]) -> None:
+        self.stream, self.convert = stream, convert
+        self.times = stream.times
+
+    def __len__(self) -> int:
+        return len(self.stream)
+
+    def read(self, index: int) -> Image:
+        return self.convert(self.stream[index])
+
+    def name(self, index: int) -> str:
+        return self.stream.name(index)
+
+    def where(self, index: int) -> str:
+        return self.stream.where(index)
 
 
 class Part(Stream):
