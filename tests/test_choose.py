@@ -190,7 +190,7 @@ def test_explain_prints_every_frame(scene: Path) -> None:
     result = calibrate(scene, "--choose", "informed", "--explain")
     assert result.exit_code in (0, 3), result.output
     for reference in list_files(scene / "visible"):
-        assert reference.name in result.stdout
+        assert reference.stem in result.stdout
     assert "source is flat" in result.stdout
     assert "1 unusable frame is left out" in result.stderr
 
