@@ -115,14 +115,17 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
 
     // All frames, from the first level at which everything is free.
     double share_limit = 0;
+    // The middle levels decide; what the coarse one leaves they find, and at the finest a step
+    // costs most.
+    const auto tolerance = [](int factor) { return factor == 2 ? 1e-6 : 1e-5; };
     const std::vector<Step> steps = schedule(report.working_width, report.working_height);
     for (std::size_t s = 0; s < steps.size(); ++s) {
         if (steps[s].stage == 1) continue;
         const Level level = make_level(images, steps[s].factor, result.rig, options.num_threads);
         if (share_limit == 0)
             share_limit = 0.8 * pooled(level, result.rig, options.num_threads).valid_share;
-        report.levels.push_back(
-            solve_level(level, steps[s].stage, share_limit, options, result.rig));
+        report.levels.push_back(solve_level(level, steps[s].stage, share_limit,
+                                            tolerance(steps[s].factor), options, result.rig));
         tell("refine", 0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
     }
     report.nec = report.levels.back().nec;

@@ -94,7 +94,7 @@ NecValue pooled(const Level& level, const Rig& rig, int num_threads) {
     return sum;
 }
 
-LevelReport solve_level(const Level& level, int stage, double share_limit,
+LevelReport solve_level(const Level& level, int stage, double share_limit, double tolerance,
                         const CalibrationOptions& options, Rig& rig) {
     const double start = seconds_now();
     SolverParameters p = solver_from_rig(rig);
@@ -122,7 +122,7 @@ LevelReport solve_level(const Level& level, int stage, double share_limit,
     solver.linear_solver_type = ceres::DENSE_QR;
     solver.max_num_iterations = options.max_iterations;
     solver.num_threads = resolve_threads(options.num_threads);
-    solver.function_tolerance = level.factor > 1 ? 1e-6 : 1e-5;
+    solver.function_tolerance = tolerance;
     solver.parameter_tolerance = 1e-7;
     solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;

@@ -12,8 +12,9 @@ double seconds_now();
 NecValue pooled(const Level& level, const Rig& rig, int num_threads);
 
 // Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and prior,
-// stage 2 everything free. A pair whose valid share falls below `share_limit` is charged for it.
-LevelReport solve_level(const Level& level, int stage, double share_limit,
+// stage 2 everything free. A pair whose valid share falls below `share_limit` is charged for it. It
+// stops where a step lowers the cost by less than the share `tolerance`.
+LevelReport solve_level(const Level& level, int stage, double share_limit, double tolerance,
                         const CalibrationOptions& options, Rig& rig);
 
 }  // namespace xcalib

@@ -313,6 +313,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
 
     CalibrationOptions quick = options;  // enough to compare by; the winner is solved in full
     quick.max_iterations = std::min(options.max_iterations, 30);
+    constexpr double kTolerance = 3e-5;
 
     // Halving: each level costs four times the last, and tells more.
     for (std::size_t s = 0; s + 1 < steps.size() || s == 0; ++s) {
@@ -321,8 +322,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
             keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
-            candidate.levels.push_back(
-                solve_level(level, steps[s].stage, candidate.share_limit, quick, candidate.rig));
+            candidate.levels.push_back(solve_level(level, steps[s].stage, candidate.share_limit,
+                                                   kTolerance, quick, candidate.rig));
             candidate.merit = merit(pooled(level, candidate.rig, num_threads));
             out.candidates[candidate.entry].refined = candidate.rig;
             out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;

@@ -86,7 +86,7 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
         Rig halves[2] = {rig, rig};
         for (std::size_t k = 0; k < 2; ++k)
             solve_level(make_level(every_second(images, k), kFactor, rig, options.num_threads), 2,
-                        0.8 * report.valid_share, quick, halves[k]);
+                        0.8 * report.valid_share, 1e-5, quick, halves[k]);
         report.repeatability_px = median_distance(level, halves[0], halves[1]);
     }
 
