@@ -12,6 +12,7 @@ for name in (
     "depth_completion",
     "depth_conditioning",
     "patch_flow",
+    "depth_sources",
 ):
     print(f"== {name}", flush=True)
     subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)

@@ -10,7 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
+from xcalib import CalibrationOptions, calibrate, synthetic
 from xcalib.depth import PlaneDepth, open_depth, read_depth
+from xcalib.depth.plane_fit import fit_plane
 from xcalib.frames import Image, InputError, write_image
 
 REFERENCE = np.zeros((480, 640), np.uint8)
@@ -121,3 +123,41 @@ def test_plane_by_hand() -> None:
 def test_plane_options_have_ranges(name: str, value: float) -> None:
     with pytest.raises(InputError, match=f"plane {name} is {value:g}, expected"):
         PlaneDepth(**{name: value})
+
+
+def test_a_rolled_plane_has_a_falling_horizon() -> None:
+    plane = PlaneDepth(camera_height=2.0, horizon=0.5, far=500.0, roll_deg=10.0)
+    depth = plane(0, REFERENCE)
+    level = PlaneDepth(camera_height=2.0, horizon=0.5, far=500.0)(0, REFERENCE)
+    # The right side of a row lies less far below the horizon, and so is farther.
+    assert depth[400, 600] > level[400, 600] > depth[400, 40]
+    # Along the horizon, which falls by tan(10 deg), depth is the same.
+    down = round(200 * math.tan(math.radians(10.0)))
+    assert depth[400 + down, 520] == pytest.approx(depth[400, 320], rel=0.02)
+
+
+def test_the_plane_is_found_from_the_footage() -> None:
+    rig = synthetic.demo_rig()
+    rig = rig.resized(320, 240, 214, 171)
+    frames = list(synthetic.render(rig, num_frames=4, seed=3))
+    references, sources = [f.reference for f in frames], [f.source for f in frames]
+    hfov = rig.reference.hfov_deg
+    wrong = PlaneDepth(horizon=0.58, far=60.0, hfov_deg=hfov)
+    options = CalibrationOptions(reference_camera=rig.reference)
+    start = calibrate(references, sources, [wrong(0, r) for r in references], None, options).rig
+    fits = 0
+
+    def count() -> None:
+        nonlocal fits
+        fits += 1
+
+    found = fit_plane(references, sources, wrong, start, options, count)
+    assert fits > 5
+    assert (found.camera_height, found.far, found.hfov_deg) == (1.6, 60.0, hfov)
+
+    def error(plane: PlaneDepth) -> float:
+        """Of inverse depth against the rendered street, where it is known [1/m]."""
+        off = [1 / plane(0, f.reference)[f.depth > 0] - 1 / f.depth[f.depth > 0] for f in frames]
+        return float(np.abs(np.concatenate(off)).mean())
+
+    assert error(found) < 0.75 * error(wrong)

@@ -42,6 +42,7 @@ from .pipeline import (
     run_calibration,
     run_registration,
     save_rig,
+    with_fitted_plane,
 )
 
 FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
@@ -165,6 +166,12 @@ frames_arguments = options(
         "DEG",
         PlaneDepth.hfov_deg,
         "Plane: horizontal field of view of the reference camera [deg].",
+    ),
+    number(
+        "--plane-roll",
+        "DEG",
+        PlaneDepth.roll_deg,
+        "Plane: how far the horizon falls towards the right [deg].",
     ),
     click.option(
         "--depth-recipe",
@@ -363,6 +370,12 @@ def cli() -> None:
     help="Reference width that calibration works at [px].",
 )
 @click.option(
+    "--refine-plane",
+    is_flag=True,
+    help="With --depth plane: find the horizon and the roll from the footage (some 17 quick fits),"
+    " and print them for `register`.",
+)
+@click.option(
     "--report",
     "report_file",
     metavar="FILE",
@@ -385,6 +398,7 @@ def calibrate_command(
     reference_hfov: float | None,
     optimize_reference: bool,
     working_width: int,
+    refine_plane: bool,
     report_file: Path | None,
     quiet: bool,
     **inputs: Any,
@@ -400,6 +414,10 @@ def calibrate_command(
         )
     if explain and choose != "informed":
         raise click.UsageError("--explain tells of --choose informed, expected that too")
+    if refine_plane and inputs["depth_spec"] != "plane":
+        raise click.UsageError(
+            f"--refine-plane goes with --depth plane, not {inputs['depth_spec']}"
+        )
     calibration = CalibrationOptions(
         max_frames=max_frames,
         seed=seed,
@@ -440,6 +458,12 @@ def calibrate_command(
     result, chosen = run_calibration(
         frames, calibration, initial_rig, quiet, set_cameras, indices, warn
     )
+    if refine_plane:
+        frames, plane = with_fitted_plane(frames, result.rig, chosen, calibration, quiet)
+        result, chosen = run_calibration(
+            frames, calibration, result.rig, quiet, set_cameras, chosen, warn
+        )
+        click.echo(f"plane: --horizon {plane.horizon:g} --plane-roll {plane.roll_deg:g}")
     save_rig(result.rig, output)
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")

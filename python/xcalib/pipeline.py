@@ -27,6 +27,7 @@ from .depth import (
     NetworkOptions,
     PlaneDepth,
 )
+from .depth.plane_fit import fit_plane, spread
 from .footage import Matching, Stream, open_pairs, open_sink
 from .footage.opening import PickedDepth
 from .footage.pairing import median_period
@@ -64,6 +65,7 @@ class Frames:
         horizon: float = PlaneDepth.horizon,
         far: float = PlaneDepth.far,
         plane_hfov: float = PlaneDepth.hfov_deg,
+        plane_roll: float = PlaneDepth.roll_deg,
         depth_recipe: str | None = None,
         depth_focal: float | None = None,
         inverse_scale: float | None = None,
@@ -80,7 +82,7 @@ class Frames:
         """Open frames as the arguments of the commands name them; the rest is `MeasuredDepth`."""
         matching = Matching(pairing, time_offset, max_gap, reference_times, source_times)
         pairs = open_pairs(reference, source, matching)
-        plane = PlaneDepth(camera_height, horizon, far, plane_hfov)
+        plane = PlaneDepth(camera_height, horizon, far, plane_hfov, plane_roll)
         network = NetworkOptions(
             depth_recipe,
             depth_focal,
@@ -181,6 +183,28 @@ def run_calibration(
         except ValueError as error:
             raise InputError(_with_file_name(str(error), frames.references, chosen)) from None
     return result, chosen
+
+
+def with_fitted_plane(
+    frames: Frames,
+    rig: Rig,
+    chosen: Sequence[int],
+    calibration: CalibrationOptions,
+    quiet: bool = False,
+) -> tuple[Frames, PlaneDepth]:
+    """The frames with the road plane that suits them best, see `fit_plane`, and that plane.
+
+    Their depth must be a `PlaneDepth`, and ``rig`` fitted with it to the ``chosen`` frames.
+    """
+    plane = frames.depth.depth if isinstance(frames.depth, PickedDepth) else frames.depth
+    if not isinstance(plane, PlaneDepth):
+        raise ValueError(f"depth is {type(plane).__name__}, expected a PlaneDepth to refine")
+    chosen = spread(chosen)
+    references = [frames.references[index] for index in chosen]
+    sources = [frames.sources[index] for index in chosen]
+    with tqdm(desc="plane", unit="fit", disable=True if quiet else None, leave=False) as bar:
+        fitted = fit_plane(references, sources, plane, rig, calibration, bar.update)
+    return replace(frames, depth=fitted), fitted
 
 
 def left_out(count: int, first: str) -> str:

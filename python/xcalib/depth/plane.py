@@ -13,20 +13,23 @@ from .provider import Depth
 
 @dataclass(frozen=True)
 class PlaneDepth:
-    """Road-plane prior: a flat road under a level camera, and everything else far away.
+    """Road-plane prior: a flat road under the camera, and everything else far away.
 
-    ``D(y) = camera_height * fy / (y - horizon row)``, never beyond ``far``, which is also the
-    depth at and above the horizon.
+    ``D(x, y) = camera_height * fy / r(x, y)``, where ``r`` is the distance of a pixel below the
+    horizon [px], never beyond ``far``, which is also the depth at and above the horizon.
     """
 
     camera_height: float = 1.6
     """Height of the reference camera above the road [m], > 0."""
     horizon: float = 0.5
-    """Row of the horizon as a fraction of the image height from the top, (-1, 1)."""
+    """Row of the horizon in the middle column, as a fraction of the image height from the top,
+    (-1, 1)."""
     far: float = 60.0
     """Largest depth [m], > 0."""
     hfov_deg: float = 45.0
     """Horizontal field of view of the reference camera [deg], (0, 180); pixels are square."""
+    roll_deg: float = 0.0
+    """How far the horizon falls towards the right [deg], (-45, 45)."""
 
     def __post_init__(self) -> None:
         for name, low, high, unit in (
@@ -34,6 +37,7 @@ class PlaneDepth:
             ("horizon", -1.0, 1.0, "of the image height"),
             ("far", 0.0, math.inf, "m"),
             ("hfov_deg", 0.0, 180.0, "deg"),
+            ("roll_deg", -45.0, 45.0, "deg"),
         ):
             value = getattr(self, name)
             if not low < value < high:  # NaN fails too
@@ -43,8 +47,12 @@ class PlaneDepth:
     def __call__(self, index: int, reference: Image) -> Depth:
         width, height = size_of(reference)
         fy = 0.5 * width / math.tan(math.radians(self.hfov_deg) / 2)
-        below = np.arange(height) - (self.horizon * height - 0.5)  # rows below the horizon [px]
-        depth = np.full(height, self.far)
+        roll = math.radians(self.roll_deg)
+        y = np.arange(height)[:, None] - (self.horizon * height - 0.5)
+        x = np.arange(width)[None, :] - (width - 1) / 2
+        # A plane's inverse depth is linear in the image; the horizon is where it is zero.
+        below = y * math.cos(roll) - x * math.sin(roll)
+        depth = np.full((height, width), self.far, np.float32)
         road = below > 0
         depth[road] = np.minimum(self.camera_height * fy / below[road], self.far)
-        return np.repeat(depth.astype(np.float32)[:, None], width, axis=1)
+        return depth
