@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ._core import FlowOptions, patch_flow
 from .frames import Image, InputError, gray, size_of
+from .onnx import Network
 
 __all__ = ["Flow", "FlowOptions", "FlowProvider", "NetworkFlow", "PatchFlow", "patch_flow"]
 
@@ -132,7 +133,7 @@ class NetworkFlow:
     Raises
     ------
     InputError
-        Where onnxruntime is not installed, or a file is not what it should be.
+        A file is not what it should be.
     """
 
     def __init__(self, model: str | Path, tolerance: float = 2.0, num_threads: int = 0) -> None:
@@ -141,7 +142,7 @@ class NetworkFlow:
         self.path = Path(model)
         self.tolerance = tolerance
         self.preparation = Preparation.read(self.path.with_suffix(".yaml"))
-        self._session = _open_session(self.path, num_threads)
+        self._session = Network(self.path, num_threads=num_threads).session
         inputs = self._session.get_inputs()
         if len(inputs) != 2:
             names = ", ".join(item.name for item in inputs)
@@ -251,20 +252,3 @@ def _fixed_sides(shape: Sequence[Any]) -> tuple[int | None, int | None]:
     """Width and height that a graph fixes [px]; None where free (unnamed or a name)."""
     height, width = (side if isinstance(side, int) and side > 0 else None for side in shape[2:4])
     return width, height
-
-
-def _open_session(path: Path, num_threads: int) -> Any:
-    """An onnxruntime session on the CPU."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected an ONNX network of two images")
-    try:
-        import onnxruntime  # type: ignore[import-untyped]
-    except ImportError:
-        raise InputError(f"{path}: needs onnxruntime, `pip install onnxruntime`") from None
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = num_threads
-    options.log_severity_level = 3  # its warnings would come between our one line and its reader
-    try:
-        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime's own types share no base but this
-        raise InputError(f"{path}: not an ONNX network: {' '.join(str(error).split())}") from None
