@@ -209,13 +209,14 @@ py::dict dict_of(const CalibrationReport& report) {
                      py::arg("reference_hfov_deg") = c.refined.reference.hfov() / kDegree,
                      py::arg("source_hfov_deg") = c.refined.source.hfov() / kDegree));
     for (const LevelReport& l : report.levels)
-        levels.append(py::dict(
-            py::arg("factor") = l.factor, py::arg("stage") = l.stage, py::arg("width") = l.width,
-            py::arg("height") = l.height, py::arg("iterations") = l.iterations,
-            py::arg("initial_cost") = l.initial_cost, py::arg("final_cost") = l.final_cost,
-            py::arg("nec") = l.nec, py::arg("valid_share") = l.valid_share,
-            py::arg("condition_number") = l.condition_number, py::arg("seconds") = l.seconds,
-            py::arg("stopped") = l.stopped));
+        levels.append(
+            py::dict(py::arg("factor") = l.factor, py::arg("stage") = l.stage,
+                     py::arg("width") = l.width, py::arg("height") = l.height,
+                     py::arg("iterations") = l.iterations, py::arg("initial_cost") = l.initial_cost,
+                     py::arg("final_cost") = l.final_cost, py::arg("nec") = l.nec,
+                     py::arg("aligned") = l.aligned, py::arg("valid_share") = l.valid_share,
+                     py::arg("condition_number") = l.condition_number,
+                     py::arg("seconds") = l.seconds, py::arg("stopped") = l.stopped));
     return py::dict(
         py::arg("converged") = report.converged, py::arg("message") = report.message,
         py::arg("seconds") = report.seconds, py::arg("search_seconds") = report.search_seconds,
@@ -382,6 +383,7 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
                       "Eq. (image_loss), and the prior in stage 1.")
         .def_readonly("final_cost", &LevelReport::final_cost, "The same at the end.")
         .def_readonly("nec", &LevelReport::nec, "Mean over the pairs, weighted by c_i.")
+        .def_readonly("aligned", &LevelReport::aligned, "The same, beyond what chance gives.")
         .def_readonly("valid_share", &LevelReport::valid_share,
                       "Share of the reference's edge energy that the source covers.")
         .def_readonly("condition_number", &LevelReport::condition_number,

@@ -1,29 +1,43 @@
-// Bilinear sampling of a gray image, and the exact derivative of the interpolant.
+// Bilinear sampling of gray images and edge maps, and the exact derivative of the interpolant.
 #pragma once
 
 #include <algorithm>
 
+#include "xcalib/edge_map.hpp"
 #include "xcalib/image.hpp"
 
 namespace xcalib {
 
+template <class T>
 struct Sample {
-    float value;
-    float du;
-    float dv;
+    T value, du, dv;
 };
 
-// (u, v) within [0, width - 1] x [0, height - 1]; both sides at least 2.
-inline Sample bilinear(const Image& image, float u, float v) {
-    // The last cell serves its far edge too, so that all four pixels exist.
-    const int x = std::min(static_cast<int>(u), image.width - 2);
-    const int y = std::min(static_cast<int>(v), image.height - 2);
+// Of width x height values; (u, v) within [0, width - 1] x [0, height - 1]; both sides at least 2.
+template <class T>
+Sample<T> bilinear(const T* values, int width, int height, float u, float v) {
+    // The last cell serves its far edge too, so that all four values exist.
+    const int x = std::min(static_cast<int>(u), width - 2);
+    const int y = std::min(static_cast<int>(v), height - 2);
     const float a = u - static_cast<float>(x), b = v - static_cast<float>(y);
-    const float* top = image.row(y) + x;
-    const float* bottom = top + image.width;
-    const float top_step = top[1] - top[0], bottom_step = bottom[1] - bottom[0];
-    const float upper = top[0] + a * top_step, lower = bottom[0] + a * bottom_step;
+    const T* top = values + static_cast<std::size_t>(y) * width + x;
+    const T* bottom = top + width;
+    const T top_step = top[1] - top[0], bottom_step = bottom[1] - bottom[0];
+    const T upper = top[0] + a * top_step, lower = bottom[0] + a * bottom_step;
     return {upper + b * (lower - upper), top_step + b * (bottom_step - top_step), lower - upper};
+}
+
+inline Sample<float> bilinear(const Image& image, float u, float v) {
+    return bilinear(image.pixels.data(), image.width, image.height, u, v);
+}
+
+inline Sample<std::complex<float>> bilinear(const EdgeMap& map, float u, float v) {
+    return bilinear(map.z.data(), map.width, map.height, u, v);
+}
+
+// std::complex's own product also looks for infinities.
+inline std::complex<float> product(std::complex<float> a, std::complex<float> b) {
+    return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
 }  // namespace xcalib

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "bilinear.hpp"
 #include "image_pair.hpp"
 #include "nec_pass.hpp"
 #include "xcalib/warp.hpp"
@@ -52,7 +53,7 @@ NecValue EdgePair::evaluate(const Rig& rig) const {
         for (int x = 0; x < depth_.width; ++x) {
             if (row.validity[x]) continue;
             const Complex r = reference[x];
-            const Complex s = product(sample(source_, row.u[x], row.v[x]).value, turn);
+            const Complex s = product(bilinear(source_, row.u[x], row.v[x]).value, turn);
             rr += std::norm(r);
             ss += std::norm(s);
             rs += r.real() * s.real() + r.imag() * s.imag();
@@ -78,7 +79,7 @@ NecNormalEquations EdgePair::normal_equations_of(const Rig& rig) const {
         int filled = 0;
         for (int x = 0; x < depth_.width; ++x) {
             if (row.validity[x]) continue;
-            EdgeSample s = sample(source_, row.u[x], row.v[x]);
+            Sample<Complex> s = bilinear(source_, row.u[x], row.v[x]);
             s = {product(s.value, turn), product(s.du, turn), product(s.dv, turn)};
             const auto ray_x =
                 static_cast<float>((x - camera.cx - camera.skew * ray_y) / camera.fx);

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
 
+#include "mat.hpp"
 #include "parallel.hpp"
 
 namespace xcalib {
@@ -31,16 +31,6 @@ struct Edges {
 
     cv::Size size() const { return weight.size(); }
 };
-
-cv::Mat as_mat(const Image& image) {
-    return {image.height, image.width, CV_32FC1, const_cast<float*>(image.pixels.data())};
-}
-
-cv::Mat blurred(const cv::Mat& map, double sigma) {
-    cv::Mat out;
-    cv::GaussianBlur(map, out, cv::Size(), sigma, sigma, cv::BORDER_REFLECT_101);
-    return out;
-}
 
 // The mean over a (large) square around each pixel; a box will do.
 cv::Mat surrounding_mean(const cv::Mat& map, double sigma) {

@@ -3,16 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <stdexcept>
 
+#include "mat.hpp"
+
 namespace xcalib {
 namespace {
-
-cv::Mat as_mat(const Image& image) {
-    return cv::Mat(image.height, image.width, CV_32FC1, const_cast<float*>(image.pixels.data()));
-}
 
 template <class T>
 void gray_rows(const ImageView& image, float scale, Image& gray) {

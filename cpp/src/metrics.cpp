@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 
+#include "mat.hpp"
 #include "parallel.hpp"
 
 namespace xcalib {
@@ -33,10 +33,6 @@ struct Correlation {
         return norm > 0 ? (ab - a * b / n) / std::sqrt(norm) : kNaN;
     }
 };
-
-cv::Mat as_mat(const Image& image) {
-    return cv::Mat(image.height, image.width, CV_32FC1, const_cast<float*>(image.pixels.data()));
-}
 
 }  // namespace
 
@@ -128,8 +124,8 @@ constexpr double kStandsOut = 0.03;  // above everything further away
 
 // 6 maps of gradient magnitude by unsigned orientation, clamped and blurred.
 std::array<cv::Mat, kBins> orientation_energy(const cv::Mat& image) {
-    cv::Mat smooth, gx, gy;
-    cv::GaussianBlur(image, smooth, cv::Size(), 1.0);
+    const cv::Mat smooth = blurred(image, 1.0);
+    cv::Mat gx, gy;
     const cv::Mat central_x = (cv::Mat_<float>(1, 3) << -0.5f, 0, 0.5f);
     cv::filter2D(smooth, gx, CV_32F, central_x);
     cv::filter2D(smooth, gy, CV_32F, central_x.t());
@@ -151,7 +147,7 @@ std::array<cv::Mat, kBins> orientation_energy(const cv::Mat& image) {
             maps[low % kBins].at<float>(y, x) += (1 - part) * energy;
             maps[(low + 1) % kBins].at<float>(y, x) += part * energy;
         }
-    for (cv::Mat& map : maps) cv::GaussianBlur(map, map, cv::Size(), 1.0);
+    for (cv::Mat& map : maps) map = blurred(map, 1.0);
     return maps;
 }
 

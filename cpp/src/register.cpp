@@ -17,21 +17,29 @@ T rounded(float value) {
     else return static_cast<T>(value + 0.5f);  // a mean of values in range is in range
 }
 
-template <class T, int kChannels>
+// One row of type T, zero where not valid: the bilinear mean, or the pixel whose centre is next, as
+// it is, so that counts of a radiometric source are never mixed.
+template <class T, int kChannels, bool kNearest>
 void sample_row(const ImageView& source, const float* u, const float* v,
-                const std::uint8_t* validity, int width, T* out) {
+                const std::uint8_t* validity, int width, void* row) {
+    T* out = static_cast<T*>(row);
     for (int x = 0; x < width; ++x, out += kChannels) {
         if (validity[x] != static_cast<std::uint8_t>(Validity::valid)) {
             for (int c = 0; c < kChannels; ++c) out[c] = T{0};
+            continue;
+        }
+        if constexpr (kNearest) {
+            const T* pixel = source.row<T>(static_cast<int>(v[x] + 0.5f)) +
+                             kChannels * static_cast<int>(u[x] + 0.5f);
+            for (int c = 0; c < kChannels; ++c) out[c] = pixel[c];
             continue;
         }
         // The last cell serves its far edge too, so that all four pixels exist.
         const int x0 = std::min(static_cast<int>(u[x]), source.width - 2);
         const int y0 = std::min(static_cast<int>(v[x]), source.height - 2);
         const float a = u[x] - static_cast<float>(x0), b = v[x] - static_cast<float>(y0);
-        const char* row = static_cast<const char*>(source.data) + y0 * source.row_bytes;
-        const T* top = reinterpret_cast<const T*>(row) + kChannels * x0;
-        const T* bottom = reinterpret_cast<const T*>(row + source.row_bytes) + kChannels * x0;
+        const T* top = source.row<T>(y0) + kChannels * x0;
+        const T* bottom = source.row<T>(y0 + 1) + kChannels * x0;
         for (int c = 0; c < kChannels; ++c) {
             const float upper =
                 static_cast<float>(top[c]) +
@@ -44,37 +52,13 @@ void sample_row(const ImageView& source, const float* u, const float* v,
     }
 }
 
-// The pixel whose centre is next, as it is: counts of a radiometric source are never mixed.
-template <class T, int kChannels>
-void sample_row_nearest(const ImageView& source, const float* u, const float* v,
-                        const std::uint8_t* validity, int width, T* out) {
-    for (int x = 0; x < width; ++x, out += kChannels) {
-        if (validity[x] != static_cast<std::uint8_t>(Validity::valid)) {
-            for (int c = 0; c < kChannels; ++c) out[c] = T{0};
-            continue;
-        }
-        const int x0 = static_cast<int>(u[x] + 0.5f), y0 = static_cast<int>(v[x] + 0.5f);
-        const char* row = static_cast<const char*>(source.data) + y0 * source.row_bytes;
-        const T* pixel = reinterpret_cast<const T*>(row) + kChannels * x0;
-        for (int c = 0; c < kChannels; ++c) out[c] = pixel[c];
-    }
-}
-
 using RowSampler = void (*)(const ImageView&, const float*, const float*, const std::uint8_t*, int,
                             void*);
 
-template <class T, int kChannels, bool kNearest>
-void sample_row_erased(const ImageView& source, const float* u, const float* v,
-                       const std::uint8_t* validity, int width, void* out) {
-    const auto sample = kNearest ? sample_row_nearest<T, kChannels> : sample_row<T, kChannels>;
-    sample(source, u, v, validity, width, static_cast<T*>(out));
-}
-
 template <class T>
 RowSampler row_sampler(int channels, bool nearest) {
-    if (channels == 3)
-        return nearest ? sample_row_erased<T, 3, true> : sample_row_erased<T, 3, false>;
-    return nearest ? sample_row_erased<T, 1, true> : sample_row_erased<T, 1, false>;
+    if (channels == 3) return nearest ? sample_row<T, 3, true> : sample_row<T, 3, false>;
+    return nearest ? sample_row<T, 1, true> : sample_row<T, 1, false>;
 }
 
 RowSampler row_sampler(PixelType type, int channels, bool nearest) {

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <opencv2/core.hpp>
 
+#include "bilinear.hpp"
 #include "parallel.hpp"
 
 namespace xcalib {
@@ -78,7 +79,7 @@ std::vector<Complex> draw(const EdgeMap& edges, const MapSampler& sampler) {
     double energy = 0;
     for (std::size_t i = 0; i < drawn.size(); ++i) {
         if (sampler.u[i] < 0) continue;
-        drawn[i] = product(sample(edges, sampler.u[i], sampler.v[i]).value, sampler.turn[i]);
+        drawn[i] = product(bilinear(edges, sampler.u[i], sampler.v[i]).value, sampler.turn[i]);
         energy += std::norm(drawn[i]);
     }
     const float scale = energy > 0 ? static_cast<float>(1 / std::sqrt(energy)) : 0.0f;

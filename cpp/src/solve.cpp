@@ -142,6 +142,7 @@ LevelReport solve_level(const Level& level, int stage, double share_limit, doubl
     report.condition_number = condition_number(problem);
     const NecValue value = pooled(level, rig, options.num_threads);
     report.nec = value.nec;
+    report.aligned = value.aligned;
     report.valid_share = value.valid_share;
     report.seconds = seconds_now() - start;
     return report;

@@ -160,15 +160,16 @@ void choose_best(const Level& level, int num_threads, int count, const Variant& 
                  Candidate& candidate) {
     std::vector<double> merits(count);
     parallel_ranges(count, num_threads, [&](int begin, int end) {
-        for (int i = begin; i < end; ++i)
-            merits[i] = preference(variant(i)) * merit(pooled(level, variant(i), 1));
+        for (int i = begin; i < end; ++i) {
+            const Rig rig = variant(i);
+            merits[i] = preference(rig) * merit(pooled(level, rig, 1));
+        }
     });
     const int best =
         static_cast<int>(std::max_element(merits.begin(), merits.end()) - merits.begin());
     if (merits[best] <= candidate.merit) return;
-    const Rig chosen = variant(best);
     candidate.merit = merits[best];
-    candidate.rig = chosen;
+    candidate.rig = variant(best);
 }
 
 // The search sees one displacement for all depths, at coarse steps of scale and roll. This looks
@@ -303,9 +304,11 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         candidate.entry = out.candidates.size();
         if (initial) candidate.rig.source_from_reference.translation = initial->t();
         const Level level = make_level(few, steps[0].factor, candidate.rig, num_threads);
-        candidate.merit = merit(pooled(level, candidate.rig, num_threads));
-        if (searches && !initial) place(level, inverse, focal_free, options, candidate);
-        candidate.share_limit = 0.8 * pooled(level, candidate.rig, num_threads).valid_share;
+        const bool placed = searches && !initial;
+        if (placed) place(level, inverse, focal_free, options, candidate);
+        const NecValue value = pooled(level, candidate.rig, num_threads);
+        if (!placed) candidate.merit = merit(value);
+        candidate.share_limit = 0.8 * value.valid_share;
         candidates.push_back(candidate);
         out.candidates.push_back(entry);
     }

@@ -40,10 +40,20 @@ Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
     return out;
 }
 
-WorkingImages every_second(const WorkingImages& images, std::size_t first) {
-    std::vector<std::size_t> indices;
-    for (std::size_t i = first; i < images.size(); i += 2) indices.push_back(i);
-    return images.subset(indices);
+// Every second pair of a level.
+Level half_of(const Level& level, std::size_t first) {
+    Level half = level;
+    half.pairs.clear();
+    half.weights.clear();
+    double sum = 0;
+    for (std::size_t i = first; i < level.pairs.size(); i += 2) {
+        half.pairs.push_back(level.pairs[i]);
+        half.weights.push_back(level.weights[i]);
+        sum += level.weights[i];
+    }
+    for (double& weight : half.weights)
+        weight = sum > 0 ? weight / sum : 1.0 / static_cast<double>(half.pairs.size());
+    return half;
 }
 
 // Median distance between where two rigs send the pixels of a level, in reference pixels of the
@@ -85,18 +95,15 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
         quick.max_iterations = std::min(options.max_iterations, 12);
         Rig halves[2] = {rig, rig};
         for (std::size_t k = 0; k < 2; ++k)
-            solve_level(make_level(every_second(images, k), kFactor, rig, options.num_threads), 2,
-                        0.8 * report.valid_share, 1e-5, quick, halves[k]);
+            solve_level(half_of(level, k), 2, 0.8 * report.valid_share, 1e-5, quick, halves[k]);
         report.repeatability_px = median_distance(level, halves[0], halves[1]);
     }
 
     // Where the fit is some pixels off, coarse edges still meet and fine ones do not.
-    const auto aligned_at = [&](int factor) {
-        return pooled(make_nec_level(images, factor, rig, options.num_threads), rig,
-                      options.num_threads)
+    const double coarse =
+        pooled(make_nec_level(images, kCoarse, rig, options.num_threads), rig, options.num_threads)
             .aligned;
-    };
-    const double coarse = aligned_at(kCoarse), fine = aligned_at(1);
+    const double fine = report.levels.back().aligned;
 
     report.converged = false;
     if (pairs < 2) report.message = "1 image pair is too few to trust, expected at least 2";

@@ -46,7 +46,7 @@ struct Level {
     int factor = 1;
     int width = 0, height = 0;  // of the reference
     int source_width = 0, source_height = 0;
-    std::vector<std::unique_ptr<ImagePair>> pairs;
+    std::vector<std::shared_ptr<const ImagePair>> pairs;
     std::vector<double> weights;  // c_i / sum c_i at `rig`
 
     Rig rig_at(const Rig& rig) const {

@@ -170,6 +170,9 @@ class LevelReport:
     def nec(self) -> float:
         """Mean over the pairs, weighted by c_i."""
     @property
+    def aligned(self) -> float:
+        """The same, beyond what chance gives."""
+    @property
     def valid_share(self) -> float:
         """Share of the reference's edge energy that the source covers."""
     @property

@@ -58,6 +58,7 @@ struct LevelReport {
     int iterations = 0;
     double initial_cost = 0.0, final_cost = 0.0;  // Eq. (image_loss), plus the prior in stage 1
     double nec = 0.0;                             // mean over the pairs, weighted by c_i
+    double aligned = 0.0;                         // the same beyond what chance gives
     double valid_share = 0.0;       // of the reference's edge energy that the source covers
     double condition_number = 0.0;  // of the normal equations, columns scaled to unit norm
     double seconds = 0.0;
