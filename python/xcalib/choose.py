@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core import choose_frames
+from .depth.provider import reciprocal
 from .frames import DecodeError, Image, gray
 
 Floats = NDArray[np.float32]
@@ -158,10 +159,9 @@ def _candidate(index: int, read: Read) -> Candidate:
         source_digest=hashlib.blake2b(source.tobytes(), digest_size=16).digest(),
     )
     if depth is not None:
-        near = np.where(depth > 0, 1 / np.maximum(depth, 1e-3), 0).astype(np.float32)
         size = first.shape[1], first.shape[0]
-        near = cv2.resize(near, size, interpolation=cv2.INTER_NEAREST).astype(np.float32)
-        found.inverse_depth = near
+        near = cv2.resize(reciprocal(depth), size, interpolation=cv2.INTER_NEAREST)
+        found.inverse_depth = near.astype(np.float32, copy=False)
     for name, image, ends in (("reference", reference, "top"), ("source", source, "both")):
         if _share_at_end(image, ends) > SATURATED:
             found.reason = f"{name} is saturated"
@@ -189,8 +189,8 @@ def edge_field(image: Floats) -> Floats:
     """Edges as ``(2, h, w)``: m cos 2a and m sin 2a, with m the gradient's length, a its angle.
 
     Doubling the angle makes opposite gradients the same, as thermal polarity wants, and lets edges
-    that meet by chance cancel. m has a soft
-    floor and a cap in units of its mean, and unit norm over the image, as in the objective.
+    that meet by chance cancel. m has a soft floor and a cap in units of its mean, and unit norm
+    over the image.
     """
     dx, dy = _gradient(image)
     length = np.hypot(dx, dy)

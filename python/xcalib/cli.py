@@ -11,19 +11,20 @@ import itertools
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
 import click
 
 from ._core import CalibrationOptions, Pinhole, Rig
+from .cli_options import options
 from .demo import run_demo
-from .depth import PNG_SCALE, PlaneDepth
-from .depth.options import MEASURED_OPTIONS
+from .depth.options import DEPTH_OPTIONS
 from .evaluate import evaluate
-from .footage import METHODS, camera_infos, is_bag, is_video
+from .footage import camera_infos, is_bag, is_video
+from .footage.options import FOOTAGE_OPTIONS
 from .frames import (
     Image,
     InputError,
@@ -48,7 +49,6 @@ from .pipeline import (
 FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
 DEFAULTS = CalibrationOptions()
 SEED = click.IntRange(0, 2**32 - 1)
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 # -- Errors --------------------------------------------------------------------------------------
@@ -102,140 +102,11 @@ def intrinsics(
     return fx, fy, cx, cy
 
 
-def clock_offset(ctx: click.Context, param: click.Parameter, value: str) -> float | None:
-    """Parse ``auto`` or seconds."""
-    if value == "auto":
-        return None
-    try:
-        seconds = float(value)
-    except ValueError:
-        seconds = math.nan
-    if not math.isfinite(seconds):
-        raise click.BadParameter(f"{value!r} is neither `auto` nor a number of seconds")
-    return seconds
-
-
-def options(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:
-    """Several click decorators as one."""
-
-    def apply(command: Command) -> Command:
-        for decorator in reversed(decorators):
-            command = decorator(command)
-        return command
-
-    return apply
-
-
-def number(
-    flag: str, metavar: str, default: float, text: str, shown: bool | str = True
-) -> Callable[[Command], Command]:
-    """An option that takes a number, with its unit in the help text."""
-    return click.option(
-        flag, metavar=metavar, type=float, default=default, show_default=shown, help=text
-    )
-
-
 frames_arguments = options(
     click.argument("reference", type=click.Path(path_type=Path)),
     click.argument("source", type=click.Path(path_type=Path)),
-    click.option(
-        "--depth",
-        "depth_spec",
-        metavar="DEPTH",
-        required=True,
-        help="Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr in m;"
-        " 0 unknown) or lidar scan (.bin, .pcd, .ply), `stereo:FOLDER` of the right camera's"
-        " images, an .onnx file of a network, or `plane` for a flat road.",
-    ),
-    number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256"),
-    number(
-        "--camera-height",
-        "M",
-        PlaneDepth.camera_height,
-        "Plane: height of the reference camera above the road [m].",
-    ),
-    number(
-        "--horizon",
-        "F",
-        PlaneDepth.horizon,
-        "Plane: row of the horizon [fraction of the image height from the top].",
-    ),
-    number("--far", "M", PlaneDepth.far, "Plane: largest depth, at and above the horizon too [m]."),
-    number(
-        "--plane-hfov",
-        "DEG",
-        PlaneDepth.hfov_deg,
-        "Plane: horizontal field of view of the reference camera [deg].",
-    ),
-    number(
-        "--plane-roll",
-        "DEG",
-        PlaneDepth.roll_deg,
-        "Plane: how far the horizon falls towards the right [deg].",
-    ),
-    click.option(
-        "--depth-recipe",
-        metavar="NAME",
-        help="Network: what it expects and returns, a name of `xcalib models list`.  [default: the"
-        " .yaml file beside it, or by its name]",
-    ),
-    click.option(
-        "--depth-focal",
-        metavar="PX",
-        type=float,
-        help="Network: focal length of the reference camera [px], for those whose depth scales"
-        " with it.",
-    ),
-    click.option(
-        "--inverse-scale",
-        metavar="A",
-        type=float,
-        help="Network: depth is 1 / (A r + B) of its output r.  [default: the recipe's; for"
-        " relative depth a guess without metric scale]",
-    ),
-    click.option("--inverse-shift", metavar="B", type=float, help="Network: see --inverse-scale."),
-    click.option(
-        "--providers",
-        metavar="NAMES",
-        default="cpu",
-        show_default=True,
-        help="Network: execution providers, the preferred first: cuda,cpu.",
-    ),
-    *MEASURED_OPTIONS,
-)
-frames_arguments = options(
-    frames_arguments,
-    click.option(
-        "--pair",
-        "pairing",
-        type=click.Choice(METHODS),
-        default="auto",
-        show_default=True,
-        help="Pair frames by name, order or time; auto: by time where both have times.",
-    ),
-    click.option(
-        "--time-offset",
-        metavar="S",
-        default="0",
-        show_default=True,
-        callback=clock_offset,
-        help="By how much the source's clock is late [s], or `auto`, from the footage.",
-    ),
-    click.option(
-        "--max-gap",
-        metavar="S",
-        type=click.FloatRange(0, min_open=True),
-        help="Largest distance in time of a pair [s].  [default: half the slower one's period]",
-    ),
-    *(
-        click.option(
-            f"--{name}-times",
-            metavar="FILE",
-            type=click.Path(path_type=Path),
-            help=f"Times of the {name} frames: lines `name timestamp`.  [default: their own]",
-        )
-        for name in ("reference", "source")
-    ),
+    *DEPTH_OPTIONS,
+    *FOOTAGE_OPTIONS,
 )
 
 

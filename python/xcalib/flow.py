@@ -9,7 +9,6 @@ at ``p + flow[p]`` in the warped source; ``flow`` is ``(H, W, 2)`` float32 [px],
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Protocol
@@ -142,32 +141,37 @@ class NetworkFlow:
         self.path = Path(model)
         self.tolerance = tolerance
         self.preparation = Preparation.read(self.path.with_suffix(".yaml"))
-        self._session = Network(self.path, num_threads=num_threads).session
-        inputs = self._session.get_inputs()
+        self._network = Network(self.path, num_threads=num_threads)
+        inputs = self._network.inputs
         if len(inputs) != 2:
             names = ", ".join(item.name for item in inputs)
             raise InputError(f"{self.path}: inputs are {names}; expected two images")
+        self._inputs: list[tuple[str, int]] = []
         for item in inputs:
             batch, channels = (*item.shape, None, None)[:2]
-            is_image = len(item.shape) == 4 and _is_one_or_free(batch) and channels in (1, 3)
-            if item.type != "tensor(float)" or not is_image:
+            if (
+                item.type != "tensor(float)"
+                or len(item.shape) != 4
+                or batch not in (1, None)
+                or channels not in (1, 3)
+            ):
                 raise InputError(
-                    f"{self.path}: input {item.name} is {item.type} {item.shape},"
+                    f"{self.path}: input {item.name} is {item.type} {list(item.shape)},"
                     " expected tensor(float) [1, 1 or 3, H, W]"
                 )
-        if _fixed_sides(inputs[0].shape) != _fixed_sides(inputs[1].shape):
+            self._inputs.append((item.name, channels))
+        if inputs[0].shape[2:] != inputs[1].shape[2:]:
             raise InputError(
                 f"{self.path}: inputs are {inputs[0].shape} and {inputs[1].shape},"
                 " expected one size"
             )
-        self._inputs = [(item.name, int(item.shape[1])) for item in inputs]
         channels = min(channels for _, channels in self._inputs)
         if max(len(self.preparation.mean), len(self.preparation.std)) > channels:
             raise InputError(
                 f"{self.path.with_suffix('.yaml')}: mean and std are for 3 channels,"
                 f" the network has {channels}"
             )
-        self._fixed = _fixed_sides(inputs[0].shape)
+        self._fixed = inputs[0].shape[3], inputs[0].shape[2]  # width and height, None where free
 
     def __call__(
         self, reference: Image, warped: Image, valid: NDArray[Any] | None
@@ -203,7 +207,7 @@ class NetworkFlow:
             for (name, channels), image in zip(self._inputs, images, strict=True)
         }
         padded = next(iter(feed.values())).shape[-2:]
-        outputs = self._session.run(None, feed)
+        outputs = self._network.run(feed, [output.name for output in self._network.outputs])
         flows = [out for out in outputs if out.ndim >= 4 and out.shape[-3:] == (2, *padded)]
         if not flows:
             shapes = ", ".join(str(out.shape) for out in outputs)
@@ -242,13 +246,3 @@ class NetworkFlow:
             for numbers in (self.preparation.mean, self.preparation.std)
         )
         return np.ascontiguousarray(((values - mean) / std)[None], dtype=np.float32)
-
-
-def _is_one_or_free(side: object) -> bool:
-    return side == 1 or not isinstance(side, int)
-
-
-def _fixed_sides(shape: Sequence[Any]) -> tuple[int | None, int | None]:
-    """Width and height that a graph fixes [px]; None where free (unnamed or a name)."""
-    height, width = (side if isinstance(side, int) and side > 0 else None for side in shape[2:4])
-    return width, height

@@ -1,19 +1,20 @@
 """Images on disk: files of a folder, their pairs, image files in, whole image files out.
 
-Files are taken in *natural* order of their names
-(``2.png`` before ``10.png``); hidden files and files of other types are ignored. Images are numpy
-arrays ``(H, W)`` or ``(H, W, 3)`` of ``uint8``, ``uint16`` or ``float32`` in the file's own range;
-colour is in OpenCV's order, blue-green-red, and an alpha channel is dropped.
+Files are taken in *natural* order of their names (``2.png`` before ``10.png``); hidden files and
+files of other types are ignored. Images are numpy arrays ``(H, W)`` or ``(H, W, 3)`` of ``uint8``,
+``uint16`` or ``float32`` in the file's own range; colour is in OpenCV's order, blue-green-red, and
+an alpha channel is dropped.
 
 Nothing half-written: a file appears under its name only when it is complete.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import tempfile
-from collections.abc import Callable, Collection, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -134,14 +135,29 @@ def read_image(path: str | Path) -> Image:
     of its sensor.
     """
     image = decode(Path(path))
-    if image.ndim == 3:
-        # Two and four channels are gray and colour with alpha.
-        image = image[..., 0] if image.shape[2] < 3 else image[..., :3]
     if image.dtype == np.float64:
         image = image.astype(np.float32)
-    if image.dtype not in (np.uint8, np.uint16, np.float32):
-        raise InputError(f"{path}: pixels are {image.dtype}, expected uint8, uint16 or float32")
-    return np.ascontiguousarray(image)
+    return as_image(image, str(path))
+
+
+def as_image(pixels: Image, where: str) -> Image:
+    """Decoded pixels as `read_image` returns them, without alpha; ``where`` names them if not."""
+    if pixels.ndim == 3:
+        # Two and four channels are gray and colour with alpha.
+        pixels = pixels[..., 0] if pixels.shape[2] < 3 else pixels[..., :3]
+    if pixels.dtype not in (np.uint8, np.uint16, np.float32):
+        raise InputError(f"{where}: pixels are {pixels.dtype}, expected uint8, uint16 or float32")
+    return np.ascontiguousarray(pixels)
+
+
+@contextlib.contextmanager
+def quiet_opencv() -> Iterator[None]:
+    """Without OpenCV's own words on a bad file: they would come between our line and its reader."""
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(level)
 
 
 def decode(path: Path) -> Image:
@@ -150,15 +166,9 @@ def decode(path: Path) -> Image:
         raise InputError(f"{path}: no such file")
     data = path.read_bytes()
     image = None
-    # OpenCV's own words on a bad file would come between our one line and its reader.
-    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
+    with quiet_opencv(), contextlib.suppress(cv2.error):
         if data and not _is_truncated(data):
             image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        pass
-    finally:
-        cv2.utils.logging.setLogLevel(level)
     if image is None:
         raise DecodeError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
     return image

@@ -91,15 +91,15 @@ class Network:
         options.intra_op_num_threads = num_threads
         options.log_severity_level = 4  # what goes wrong is raised: no second text on stderr
         try:
-            self.session = onnxruntime.InferenceSession(str(path), options, providers=wanted)
+            self._session = onnxruntime.InferenceSession(str(path), options, providers=wanted)
         except Exception as error:  # its exceptions have no common base
             raise InputError(f"{path}: {_reason(str(error))}") from None
         # ONNX Runtime falls back to the CPU in silence where a driver is missing.
-        lost = set(wanted) - set(self.session.get_providers())
+        lost = set(wanted) - set(self._session.get_providers())
         if lost:
             raise InputError(f"provider {', '.join(lost)} cannot be started: is its driver here?")
-        self.inputs = [_tensor(node) for node in self.session.get_inputs()]
-        self.outputs = [_tensor(node) for node in self.session.get_outputs()]
+        self.inputs = [_tensor(node) for node in self._session.get_inputs()]
+        self.outputs = [_tensor(node) for node in self._session.get_outputs()]
 
     def run(self, feeds: Mapping[str, Array], outputs: Sequence[str]) -> list[NDArray[np.float32]]:
         """Values of the named outputs as float32.
@@ -110,7 +110,7 @@ class Network:
             The graph refuses these inputs; sizes it was not made for are the usual cause.
         """
         try:
-            values = self.session.run(list(outputs), dict(feeds))
+            values = self._session.run(list(outputs), dict(feeds))
         except Exception as error:
             shapes = ", ".join(f"{name} {value.shape}" for name, value in feeds.items())
             raise InputError(f"{self.path}: cannot run on {shapes}: {_brief(str(error))}") from None

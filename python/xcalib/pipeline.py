@@ -103,6 +103,11 @@ class Frames:
         reference = self.references[index]
         return reference, self.sources[index], self.depth(index, reference)
 
+    @property
+    def given_depth(self) -> DepthProvider:
+        """The provider itself, where `depth` only picks of its frames."""
+        return self.depth.depth if isinstance(self.depth, PickedDepth) else self.depth
+
     def with_scalar_sources(self, colormap: str) -> tuple[Frames, str]:
         """The frames with false-colour sources turned back to numbers, and a line on it or ''."""
         sources, line = scalar_sources(self.sources, colormap)
@@ -115,10 +120,7 @@ class Frames:
 
 def choose_by_content(frames: Frames, max_frames: int, seed: int, quiet: bool = False) -> Choice:
     """The frames that say most about the rig, see `choose`. Depth counts where it is cheap."""
-    depth = frames.depth
-    cheap = isinstance(
-        depth.depth if isinstance(depth, PickedDepth) else depth, FolderDepth | PlaneDepth
-    )
+    cheap = isinstance(frames.given_depth, FolderDepth | PlaneDepth)
 
     def read(index: int) -> tuple[Image, Image, NDArray[np.float32] | None]:
         if cheap:
@@ -196,7 +198,7 @@ def with_fitted_plane(
 
     Their depth must be a `PlaneDepth`, and ``rig`` fitted with it to the ``chosen`` frames.
     """
-    plane = frames.depth.depth if isinstance(frames.depth, PickedDepth) else frames.depth
+    plane = frames.given_depth
     if not isinstance(plane, PlaneDepth):
         raise ValueError(f"depth is {type(plane).__name__}, expected a PlaneDepth to refine")
     chosen = spread(chosen)

@@ -3,7 +3,7 @@
 Unknown pixels take the steady state of a diffusion of inverse depth, in which a plane is linear,
 from the known ones. It is reached coarse to fine: each level of a pyramid starts from the coarser
 one and needs a few relaxations only. Image edges conduct less, so depth rather changes there.
-`bench/depth_completion.py` compares this with others; docs/inputs.md has the figures.
+`bench/depth_completion.py` compares this with others; docs/inputs_measured.md has the figures.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import Image, InputError, gray, same_aspect, size_of
-from .provider import Depth, DepthProvider
+from .provider import Depth, DepthProvider, reciprocal
 
 Array = NDArray[Any]
 """float32."""
@@ -78,9 +78,7 @@ def complete(depth: Depth, guide: Image) -> tuple[Depth, Array]:
             f"depth is {depth.shape[1]}x{depth.shape[0]}, its guide"
             f" {guide.shape[1]}x{guide.shape[0]}; expected the same aspect"
         )
-    inverse = np.zeros(depth.shape, np.float32)
-    np.divide(1, depth, out=inverse, where=known)
-    filled = _diffused(inverse, known, compressed(guide, size_of(depth)))
+    filled = _diffused(reciprocal(depth), known, compressed(guide, size_of(depth)))
     dense = np.where(known, depth, 1 / filled).astype(np.float32, copy=False)
     return dense, _confidence(filled, known)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..frames import Image, size_of
 from .completion import compressed
-from .provider import Depth, DepthProvider
+from .provider import Depth, DepthProvider, reciprocal
 
 Array = NDArray[Any]
 """float32."""
@@ -51,8 +51,7 @@ class SteadyDepth:
         """
         depth = self.provider(index, reference)
         known = depth > 0
-        inverse = np.zeros(depth.shape, np.float32)
-        np.divide(1, depth, out=inverse, where=known)
+        inverse = reciprocal(depth)
         image = compressed(reference, size_of(depth))
         count = known.astype(np.float32)
         if self._last == index - 1 and self._inverse.shape == inverse.shape:
@@ -70,9 +69,7 @@ class SteadyDepth:
             count = np.where(still, np.minimum(seen + 1, MEMORY), count)
             inverse = np.where(still, predicted + step / np.maximum(count, 1), inverse)
         self._last, self._inverse, self._image, self._count = index, inverse, image, count
-        steady = np.zeros_like(inverse)
-        np.divide(1, inverse, out=steady, where=known)
-        return steady
+        return reciprocal(inverse)
 
     def _carried(self, image: Array) -> tuple[Array, Array, Array]:
         """The last inverse depth, image and count where this image shows the same things."""

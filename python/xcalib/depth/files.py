@@ -28,7 +28,9 @@ class FolderDepth:
     ) -> None:
         if not 0 < scale < math.inf:
             raise InputError(f"depth scale is {scale:g}, expected above 0 m per count")
-        self.paths = [depth for _, depth in pair(reference_paths, _list_depths(Path(folder)))]
+        self.paths = [
+            depth for _, depth in pair(reference_paths, list_files(folder, DEPTH_SUFFIXES))
+        ]
         self.scale = scale
 
     def __call__(self, index: int, reference: Image) -> Depth:
@@ -41,10 +43,6 @@ class FolderDepth:
                 " expected the same aspect"
             )
         return depth
-
-
-def _list_depths(folder: Path) -> list[Path]:
-    return list_files(folder, DEPTH_SUFFIXES)
 
 
 def read_depth(path: str | Path, scale: float = PNG_SCALE) -> Depth:

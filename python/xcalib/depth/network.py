@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..cache import ResultCache, file_hash
 from ..frames import Image, InputError, Size, same_aspect, size_of
 from ..onnx import ImageInput, Network
-from .provider import Depth
+from .provider import Depth, reciprocal
 from .recipes import Recipe, find_recipe
 
 Array = NDArray[np.float32]
@@ -313,12 +313,12 @@ def to_aspect(depth: Depth, reference: Size) -> Depth:
         return depth
     size = width, max(1, round(width * reference[1] / reference[0]))
     known = (depth > 0).astype(np.float32)
-    inverse = np.divide(1, depth, out=np.zeros_like(depth), where=depth > 0)
+    inverse = reciprocal(depth)
     nearest = cv2.resize(inverse, size, interpolation=cv2.INTER_NEAREST_EXACT)
     between = cv2.resize(inverse, size, interpolation=cv2.INTER_LINEAR)
     alone = cv2.resize(known, size, interpolation=cv2.INTER_LINEAR) < 1
     inverse = np.where(alone | (np.abs(between - nearest) > STEP * nearest), nearest, between)
-    return np.divide(1, inverse, out=np.zeros_like(inverse), where=inverse > 0)
+    return reciprocal(inverse)
 
 
 def _rounded(side: float, multiple: int, bound: int, at_least: bool) -> int:

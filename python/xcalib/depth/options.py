@@ -1,26 +1,86 @@
-"""The command-line options of `MeasuredDepth`; they bear the names of its fields."""
+"""The command-line options about depth; those of `MeasuredDepth` bear the names of its fields."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import click
 
+from ..cli_options import file, number
+from .files import PNG_SCALE
 from .measured import MeasuredDepth
+from .plane import PlaneDepth
 
-
-def _file(flag: str, text: str) -> Callable[[Any], Any]:
-    return click.option(flag, metavar="FILE", type=click.Path(path_type=Path), help=text)
-
-
-MEASURED_OPTIONS: tuple[Callable[[Any], Any], ...] = (
-    _file(
+DEPTH_OPTIONS: tuple[Callable[[Any], Any], ...] = (
+    click.option(
+        "--depth",
+        "depth_spec",
+        metavar="DEPTH",
+        required=True,
+        help="Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr in m;"
+        " 0 unknown) or lidar scan (.bin, .pcd, .ply), `stereo:FOLDER` of the right camera's"
+        " images, an .onnx file of a network, or `plane` for a flat road.",
+    ),
+    number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256"),
+    number(
+        "--camera-height",
+        "M",
+        PlaneDepth.camera_height,
+        "Plane: height of the reference camera above the road [m].",
+    ),
+    number(
+        "--horizon",
+        "F",
+        PlaneDepth.horizon,
+        "Plane: row of the horizon [fraction of the image height from the top].",
+    ),
+    number("--far", "M", PlaneDepth.far, "Plane: largest depth, at and above the horizon too [m]."),
+    number(
+        "--plane-hfov",
+        "DEG",
+        PlaneDepth.hfov_deg,
+        "Plane: horizontal field of view of the reference camera [deg].",
+    ),
+    number(
+        "--plane-roll",
+        "DEG",
+        PlaneDepth.roll_deg,
+        "Plane: how far the horizon falls towards the right [deg].",
+    ),
+    click.option(
+        "--depth-recipe",
+        metavar="NAME",
+        help="Network: what it expects and returns, a name of `xcalib models list`.  [default: the"
+        " .yaml file beside it, or by its name]",
+    ),
+    click.option(
+        "--depth-focal",
+        metavar="PX",
+        type=float,
+        help="Network: focal length of the reference camera [px], for those whose depth scales"
+        " with it.",
+    ),
+    click.option(
+        "--inverse-scale",
+        metavar="A",
+        type=float,
+        help="Network: depth is 1 / (A r + B) of its output r.  [default: the recipe's; for"
+        " relative depth a guess without metric scale]",
+    ),
+    click.option("--inverse-shift", metavar="B", type=float, help="Network: see --inverse-scale."),
+    click.option(
+        "--providers",
+        metavar="NAMES",
+        default="cpu",
+        show_default=True,
+        help="Network: execution providers, the preferred first: cuda,cpu.",
+    ),
+    file(
         "--lidar-calibration",
         "Lidar: calibration of camera and lidar (YAML or KITTI's .txt; a folder of the latter).",
     ),
-    _file("--stereo-calibration", "Stereo: YAML with baseline, focal and doffs."),
+    file("--stereo-calibration", "Stereo: YAML with baseline, focal and doffs."),
     click.option(
         "--stereo-baseline",
         metavar="M",

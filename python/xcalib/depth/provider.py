@@ -12,6 +12,11 @@ from ..frames import Image
 Depth = NDArray[np.float32]
 
 
+def reciprocal(values: Depth) -> Depth:
+    """Inverse depth of depth, and back: 0 where it is not above 0."""
+    return np.divide(1, values, out=np.zeros(values.shape, np.float32), where=values > 0)
+
+
 class DepthProvider(Protocol):
     """Depth of frame ``index``, whose reference image is given: ``(h, w)`` float32 [m]."""
 

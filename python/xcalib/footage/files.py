@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import glob
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
-import numpy as np
 
-from ..frames import IMAGE_SUFFIXES, Image, InputError, list_files, natural_key, read_image
+from ..frames import (
+    IMAGE_SUFFIXES,
+    Image,
+    InputError,
+    as_image,
+    list_files,
+    natural_key,
+    quiet_opencv,
+    read_image,
+)
 from .stream import Stream
 from .times import read_times, times_of_names
 
@@ -49,11 +58,8 @@ def matching_files(pattern: Path) -> list[Path]:
         digits = rf"\d{{{int(width)},}}" if width else r"\d+"
         name = re.compile(re.escape(before) + digits + re.escape(after))
         folder = pattern.parent
-        found = (
-            [path for path in folder.iterdir() if name.fullmatch(path.name)]
-            if (folder.is_dir())
-            else []
-        )
+        files = folder.iterdir() if folder.is_dir() else ()
+        found = [path for path in files if name.fullmatch(path.name)]
     else:
         found = [Path(path) for path in glob.glob(str(pattern))]
     found = [path for path in found if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file()]
@@ -67,11 +73,8 @@ class Pages(Stream):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-        try:
+        with quiet_opencv():
             self._count = cv2.imcount(str(path), cv2.IMREAD_UNCHANGED)
-        finally:
-            cv2.utils.logging.setLogLevel(level)
         if not self._count:
             raise InputError(f"{path}: cannot decode, truncated or not a TIFF")
 
@@ -79,21 +82,13 @@ class Pages(Stream):
         return self._count
 
     def read(self, index: int) -> Image:
-        level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-        try:
+        done = False
+        pages: Sequence[Image] = ()
+        with quiet_opencv(), contextlib.suppress(cv2.error):
             done, pages = cv2.imreadmulti(str(self.path), index, 1, flags=cv2.IMREAD_UNCHANGED)
-        except cv2.error:
-            done, pages = False, ()
-        finally:
-            cv2.utils.logging.setLogLevel(level)
         if not done or len(pages) != 1:
             raise InputError(f"{self.where(index)}: cannot decode, truncated")
-        page: Image = pages[0]
-        if page.dtype not in (np.uint8, np.uint16, np.float32):
-            raise InputError(
-                f"{self.where(index)}: pixels are {page.dtype}, expected uint8, uint16 or float32"
-            )
-        return np.ascontiguousarray(page[..., :3] if page.ndim == 3 else page)
+        return as_image(pages[0], self.where(index))
 
     def name(self, index: int) -> str:
         return f"{index:06d}"

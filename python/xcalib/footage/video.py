@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ..frames import Image, InputError
+from ..frames import Image, InputError, quiet_opencv
 from .stream import Stream
 
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv")
@@ -52,11 +52,8 @@ class Video(Stream):
         self._last: tuple[int, Image] | None = None
 
     def _open(self) -> cv2.VideoCapture:
-        level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-        try:
+        with quiet_opencv():
             capture = cv2.VideoCapture(str(self.path), cv2.CAP_FFMPEG)
-        finally:
-            cv2.utils.logging.setLogLevel(level)
         if not capture.isOpened():
             raise InputError(f"{self.path}: cannot decode frame 0, truncated or not a video")
         # As with images: the geometry is that of the sensor, whatever a tag says of turning it.
