@@ -11,18 +11,13 @@ import time
 import cv2
 import numpy as np
 from common import data, machine
+from night import SIZE, NightRig, gray
 
 import xcalib
 from xcalib import metrics, synthetic
 from xcalib.flow import patch_flow
 
-SIZE = (583, 473)
 CONFIDENT = 0.5
-
-
-def gray(image: np.ndarray) -> np.ndarray:
-    one = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
-    return one.astype(np.float32) / np.iinfo(one.dtype).max
 
 
 def turned(rig: xcalib.Rig, pan_px: float, tilt_px: float, roll_deg: float) -> xcalib.Rig:
@@ -127,32 +122,21 @@ def shifted_pairs(count: int) -> None:
 
 
 def night_rig() -> None:
-    folder = data("lynred_night")
-    if folder is None:
+    night = NightRig.open()
+    if night is None:
         return
-    names = sorted(p.name for p in (folder / "visible").iterdir())
-    held = names[4::5]
 
-    def load(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        visible = cv2.imread(str(folder / "visible" / name))
-        thermal = cv2.imread(str(folder / "thermal" / name), cv2.IMREAD_UNCHANGED)
-        raw = cv2.imread(str(folder / "depth_filled" / name), cv2.IMREAD_UNCHANGED)
-        return visible, thermal, raw.astype(np.float32) / 256
+    def depth(name: str) -> np.ndarray:
+        return night.depth("depth_filled", name)
 
-    pairs = [load(name) for name in names if name not in held]
-    result = xcalib.calibrate(*zip(*pairs, strict=True))
-    registrar = xcalib.Registrar(result.rig.resized(*SIZE, 579, 477))
+    views = list(night.views(night.fit(depth).rig, depth))
     lengths, patches, shares, both = [], [], [], []
-    for name in held:
-        visible, thermal, depth = load(name)
-        reference = cv2.resize(gray(visible), SIZE, interpolation=cv2.INTER_AREA)
-        registered, mask = registrar.register(gray(thermal), depth)
-        inside = cv2.erode((mask == 0).astype(np.uint8), np.ones((5, 5), np.uint8))
-        flow, confidence = patch_flow(reference, registered, inside)
-        told = (confidence >= CONFIDENT) & (inside > 0)
+    for view in views:
+        flow, confidence = patch_flow(view.reference, view.registered, view.inside)
+        told = (confidence >= CONFIDENT) & (view.inside > 0)
         lengths.append(np.linalg.norm(flow, axis=-1)[told])
-        shares.append(told.sum() / inside.sum())
-        residual = metrics.patch_residual(reference, registered, inside)
+        shares.append(told.sum() / view.inside.sum())
+        residual = metrics.patch_residual(view.reference, view.registered, view.inside)
         patches.append(residual.norms)
         for (x, y), shift in zip(
             residual.centers.round().astype(int), residual.shifts, strict=True
@@ -161,7 +145,7 @@ def night_rig() -> None:
                 both.append(np.linalg.norm(flow[y, x] - shift))
     length, patch = np.concatenate(lengths), np.concatenate(patches)
     print(
-        f"night rig, {len(held)} held-out frames: flow median {np.median(length):.2f} px, "
+        f"night rig, {len(views)} held-out frames: flow median {np.median(length):.2f} px, "
         f"{np.mean(length < 2):.0%} under 2 px, {np.mean(shares):.0%} of the pixels confident; "
         f"patch residual median {np.median(patch):.2f} px, {np.mean(patch < 2):.0%} under 2 px, "
         f"{len(patch)} patches; the two differ by {np.median(both):.2f} px (median of {len(both)})"
