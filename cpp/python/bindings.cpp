@@ -126,6 +126,44 @@ Compared compared(const py::object& reference, const py::object& registered,
     return out;
 }
 
+template <class Value>
+py::array_t<Value> array_of(const std::vector<Value>& values, int width, int height) {
+    return py::array_t<Value>({height, width}, values.data());
+}
+
+// What a flow provider returned, as a field with a vector at every pixel.
+FlowField field_from(const py::object& returned, int width, int height) {
+    const char* expected =
+        "flow provider: expected (flow, confidence), arrays (H, W, 2) and (H, W) of the images' ";
+    const auto refuse = [&](const std::string& got) {
+        throw py::value_error(expected + std::to_string(width) + "x" + std::to_string(height) +
+                              ", got " + got);
+    };
+    if (!py::isinstance<py::sequence>(returned) || py::len(returned) != 2)
+        refuse(py::type::of(returned).attr("__name__").cast<std::string>());
+    using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
+    const py::sequence pair = returned;
+    const Floats flow = Floats::ensure(pair[0]), confidence = Floats::ensure(pair[1]);
+    if (!flow || flow.ndim() != 3 || flow.shape(0) != height || flow.shape(1) != width ||
+        flow.shape(2) != 2)
+        refuse(flow ? "flow of " + shape_text(flow) : "no array of flow");
+    if (!confidence || confidence.ndim() != 2 || confidence.shape(0) != height ||
+        confidence.shape(1) != width)
+        refuse(confidence ? "confidence of " + shape_text(confidence) : "no array of confidence");
+    const std::size_t count = static_cast<std::size_t>(width) * height;
+    FlowField field{width,
+                    height,
+                    1,
+                    std::vector<float>(count),
+                    std::vector<float>(count),
+                    std::vector<float>(confidence.data(), confidence.data() + count)};
+    for (std::size_t i = 0; i < count; ++i) {
+        field.x[i] = flow.data()[2 * i];
+        field.y[i] = flow.data()[2 * i + 1];
+    }
+    return field;
+}
+
 // Gray images of integers lie in [0, 1], and float32 images are taken to.
 double range_of(const py::object& data_range) {
     if (data_range.is_none()) return 1.0;
@@ -171,21 +209,33 @@ std::string text_of(const Pinhole& c) {
     return out.str();
 }
 
-const char* name_of(SearchMode mode) {
-    switch (mode) {
-        case SearchMode::automatic: return "auto";
-        case SearchMode::full: return "full";
-        case SearchMode::local: return "local";
-        case SearchMode::off: return "off";
-    }
+// The words that enumerations go by.
+template <class Value>
+using Words = std::vector<std::pair<Value, const char*>>;
+const Words<SearchMode> kSearchModes = {{SearchMode::automatic, "auto"},
+                                        {SearchMode::full, "full"},
+                                        {SearchMode::local, "local"},
+                                        {SearchMode::off, "off"}};
+const Words<FlowMode> kFlowModes = {
+    {FlowMode::automatic, "auto"}, {FlowMode::on, "on"}, {FlowMode::off, "off"}};
+const Words<Solver> kSolvers = {{Solver::ceres, "ceres"}, {Solver::adam, "adam"}};
+
+template <class Value>
+const char* word_of(Value value, const Words<Value>& words) {
+    for (const auto& [known, word] : words)
+        if (known == value) return word;
     return "";
 }
 
-SearchMode mode_of(const std::string& name) {
-    for (SearchMode mode :
-         {SearchMode::automatic, SearchMode::full, SearchMode::local, SearchMode::off})
-        if (name == name_of(mode)) return mode;
-    throw py::value_error("search mode is '" + name + "', expected auto, full, local or off");
+template <class Value>
+Value value_of(const char* field, const std::string& given, const Words<Value>& words) {
+    std::string expected;
+    for (std::size_t i = 0; i < words.size(); ++i) {
+        if (given == words[i].second) return words[i].first;
+        expected += (i == 0 ? "" : i + 1 < words.size() ? ", " : " or ");
+        expected += words[i].second;
+    }
+    throw py::value_error(std::string(field) + " is '" + given + "', expected " + expected);
 }
 
 // Sets the fields that keyword arguments name; an unknown one is an error.
@@ -201,7 +251,11 @@ Options options_from(const py::kwargs& fields) {
 }
 
 py::dict dict_of(const CalibrationReport& report) {
-    py::list candidates, levels;
+    py::list candidates, levels, steps;
+    for (const AdamStep& s : report.steps)
+        steps.append(py::dict(py::arg("learning_rate") = s.learning_rate,
+                              py::arg("image") = s.image, py::arg("flow") = s.flow,
+                              py::arg("prior") = s.prior, py::arg("total") = s.total));
     for (const CandidateReport& c : report.candidates)
         candidates.append(
             py::dict(py::arg("score") = c.score, py::arg("correlation") = c.correlation,
@@ -225,7 +279,7 @@ py::dict dict_of(const CalibrationReport& report) {
         py::arg("baseline_nec") = report.baseline_nec, py::arg("contrast") = report.contrast,
         py::arg("repeatability_px") = report.repeatability_px,
         py::arg("valid_share") = report.valid_share, py::arg("frames") = report.frames,
-        py::arg("candidates") = candidates, py::arg("levels") = levels);
+        py::arg("candidates") = candidates, py::arg("levels") = levels, py::arg("steps") = steps);
 }
 
 }  // namespace
@@ -336,8 +390,10 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
     py::class_<SearchOptions>(m, "SearchOptions", "The global search that starts a calibration.")
         .def(py::init(&options_from<SearchOptions>))
         .def_property(
-            "mode", [](const SearchOptions& o) { return name_of(o.mode); },
-            [](SearchOptions& o, const std::string& name) { o.mode = mode_of(name); },
+            "mode", [](const SearchOptions& o) { return word_of(o.mode, kSearchModes); },
+            [](SearchOptions& o, const std::string& word) {
+                o.mode = value_of("search mode", word, kSearchModes);
+            },
             "auto (full without an initial rig, local with one), full, local or off.")
         .def_readwrite("max_fov_ratio", &SearchOptions::max_fov_ratio,
                        "Largest ratio of the two fields of view, either way, in tangents; > 1.")
@@ -347,6 +403,19 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readwrite("map_width", &SearchOptions::map_width, "Width searched at [px], >= 32.")
         .def_readwrite("candidates", &SearchOptions::candidates,
                        "Peaks refined before one is chosen, >= 1.");
+
+    py::class_<AdamOptions>(m, "AdamOptions",
+                            "The published schedule. Keyword arguments set fields.")
+        .def(py::init(&options_from<AdamOptions>))
+        .def_readwrite("epochs", &AdamOptions::epochs, ">= 1")
+        .def_readwrite("batch", &AdamOptions::batch, "Pairs, >= 1.")
+        .def_readwrite("learning_rate", &AdamOptions::learning_rate, "Of stage 1, > 0.")
+        .def_readwrite("fine_learning_rate", &AdamOptions::fine_learning_rate, "Of stage 2, > 0.")
+        .def_readwrite("decay", &AdamOptions::decay, "Of either by a step, in (0, 1].")
+        .def_readwrite("fine_from", &AdamOptions::fine_from,
+                       "Share of all steps at which stage 2 begins, in [0, 1].")
+        .def_readwrite("translation_scales", &AdamOptions::translation_scales,
+                       "Of Eq. (translation), 1 to 3.");
 
     py::class_<CalibrationOptions>(m, "CalibrationOptions",
                                    "Options of calibrate(). Keyword arguments set fields.")
@@ -361,6 +430,16 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
                        "Per stage and level; >= 1.")
         .def_readwrite("prior_weight", &CalibrationOptions::prior_weight,
                        "gamma of Eq. (total_loss), in stage 1; >= 0.")
+        .def_property(
+            "flow", [](const CalibrationOptions& o) { return word_of(o.flow, kFlowModes); },
+            [](CalibrationOptions& o, const std::string& word) {
+                o.flow = value_of("flow", word, kFlowModes);
+            },
+            "The flow term: 'auto' (where nothing is searched), 'on' or 'off'.")
+        .def_readwrite("flow_weight", &CalibrationOptions::flow_weight,
+                       "lambda of Eq. (total_loss); > 0.")
+        .def_readwrite("flow_rounds", &CalibrationOptions::flow_rounds,
+                       "Times at most that a stage at a level estimates flow; >= 1.")
         .def_readwrite("reference_camera", &CalibrationOptions::reference_camera,
                        "Known intrinsics, frozen, or None.")
         .def_readwrite("source_camera", &CalibrationOptions::source_camera,
@@ -370,6 +449,13 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readwrite("optimize_reference", &CalibrationOptions::optimize_reference,
                        "Free the reference's intrinsics too; they are coupled with the source's.")
         .def_readwrite("search", &CalibrationOptions::search, "SearchOptions.")
+        .def_property(
+            "solver", [](const CalibrationOptions& o) { return word_of(o.solver, kSolvers); },
+            [](CalibrationOptions& o, const std::string& word) {
+                o.solver = value_of("solver", word, kSolvers);
+            },
+            "'ceres', or 'adam' as published, which searches nothing.")
+        .def_readwrite("adam", &CalibrationOptions::adam, "AdamOptions.")
         .def("validate", &CalibrationOptions::validate,
              "Raises ValueError naming the field, its value and the allowed range.");
 
@@ -401,6 +487,13 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readonly("found", &CandidateReport::found, "Rig, by the search.")
         .def_readonly("refined", &CandidateReport::refined, "Rig, after the coarse levels.");
 
+    py::class_<AdamStep>(m, "AdamStep", "Before a step of Adam is taken: means over its batch.")
+        .def_readonly("learning_rate", &AdamStep::learning_rate, "Of the step.")
+        .def_readonly("image", &AdamStep::image, "Eq. (image_loss).")
+        .def_readonly("flow", &AdamStep::flow, "Eq. (flow_loss), in half widths of the reference.")
+        .def_readonly("prior", &AdamStep::prior, "Eq. (camera_regularization).")
+        .def_readonly("total", &AdamStep::total, "Eq. (total_loss).");
+
     py::class_<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
         .def_readonly("message", &CalibrationReport::message, "Why, in one line.")
@@ -421,6 +514,7 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readonly("candidates", &CalibrationReport::candidates,
                       "Of the search, best score first.")
         .def_readonly("levels", &CalibrationReport::levels, "In the order solved.")
+        .def_readonly("steps", &CalibrationReport::steps, "AdamStep, of solver 'adam'.")
         .def("brief", &CalibrationReport::brief, "One line.")
         .def("full", &CalibrationReport::full, "A table.")
         .def("to_dict", &dict_of, "Plain lists and numbers, as for JSON.");
@@ -437,7 +531,7 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         "calibrate",
         [](const py::sequence& references, const py::sequence& sources, const py::sequence& depths,
            const std::optional<Rig>& initial, const CalibrationOptions& options,
-           const py::object& progress) {
+           const py::object& progress, const py::object& flow) {
             const HeldList r = list_of("reference", references, image_of);
             const HeldList s = list_of("source", sources, image_of);
             const HeldList d = list_of("depth", depths, depth_of);
@@ -446,17 +540,30 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
                 if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
                 if (!progress.is_none()) progress(stage, share);
             };
+            FlowEstimator estimator;
+            if (!flow.is_none())
+                estimator = [&flow](const Image& reference, const Image& warped,
+                                    const std::vector<std::uint8_t>& valid) {
+                    const py::gil_scoped_acquire gil;
+                    const auto array = [&](const auto& values) {
+                        return array_of(values, reference.width, reference.height);
+                    };
+                    return field_from(
+                        flow(array(reference.pixels), array(warped.pixels), array(valid)),
+                        reference.width, reference.height);
+                };
             const py::gil_scoped_release unlocked;
-            return calibrate(r.views, s.views, d.views, initial, options, tell);
+            return calibrate(r.views, s.views, d.views, initial, options, tell, estimator);
         },
         py::arg("references"), py::arg("sources"), py::arg("depths"),
         py::arg("initial") = py::none(), py::arg("options") = CalibrationOptions{},
-        py::arg("progress") = py::none(),
+        py::arg("progress") = py::none(), py::arg("flow") = py::none(),
         R"(Estimates the rig from footage and depth, without a target.
 
 references, sources: sequences of (H, W) or (H, W, 3) uint8 | uint16 | float32 images, pairs by
 index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN / inf unknown.
-initial: Rig to start from. progress: called with (stage, share of the work done).
+initial: Rig to start from. progress: called with (stage, share of the work done). flow: a
+provider as in xcalib.flow, for the flow term; None is the built-in patch flow.
 Images are copied only where their rows are not contiguous.
 
 Raises ValueError, naming the frame, on unusable input. Not to converge is a result:

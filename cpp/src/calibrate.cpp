@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "adam.hpp"
 #include "solve.hpp"
 #include "start.hpp"
 #include "verdict.hpp"
@@ -29,6 +30,37 @@ void require_size(const char* name, const std::optional<Pinhole>& camera, const 
     throw std::invalid_argument(message.str());
 }
 
+// Global search, then Levenberg-Marquardt from coarse to fine.
+void search_and_refine(const WorkingImages& images, const ImageView& reference,
+                       const ImageView& source, const std::optional<Rig>& initial,
+                       const CalibrationOptions& options, const FlowEstimator& flow,
+                       const Progress& tell, CalibrationResult& result) {
+    CalibrationReport& report = result.report;
+    tell("search", 0.05);
+    const Start found = find_start(images, reference, source, initial, options, flow,
+                                   [&](double share) { tell("search", 0.05 + 0.55 * share); });
+    report.search_seconds = found.search_seconds;
+    report.candidates = found.candidates;
+    report.levels = found.levels;
+    result.rig = found.rig;
+
+    // All frames, from the first level at which everything is free.
+    double share_limit = 0;
+    // The middle levels decide; what the coarse one leaves they find, and at the finest a step
+    // costs most.
+    const auto tolerance = [](int factor) { return factor == 2 ? 1e-6 : 1e-5; };
+    const std::vector<Step> steps = schedule(report.working_width, report.working_height);
+    for (std::size_t s = 0; s < steps.size(); ++s) {
+        if (steps[s].stage == 1) continue;
+        const Level level = make_level(images, steps[s].factor, result.rig, options.num_threads);
+        if (share_limit == 0)
+            share_limit = 0.8 * pooled(level, result.rig, options.num_threads).valid_share;
+        report.levels.push_back(solve_stage(images, level, steps[s].stage, share_limit,
+                                            tolerance(steps[s].factor), options, flow, result.rig));
+        tell("refine", 0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
+    }
+}
+
 }  // namespace
 
 void CalibrationOptions::validate() const {
@@ -38,6 +70,9 @@ void CalibrationOptions::validate() const {
     require(max_iterations >= 1, "max_iterations", max_iterations, "at least 1");
     require(std::isfinite(prior_weight) && prior_weight >= 0, "prior_weight", prior_weight,
             "a finite number >= 0");
+    require(std::isfinite(flow_weight) && flow_weight > 0, "flow_weight", flow_weight,
+            "a finite number > 0");
+    require(flow_rounds >= 1, "flow_rounds", flow_rounds, "at least 1");
     if (reference_hfov_deg)
         require(*reference_hfov_deg > 0 && *reference_hfov_deg < 180, "reference_hfov_deg",
                 *reference_hfov_deg, "an angle in (0, 180) deg");
@@ -51,6 +86,21 @@ void CalibrationOptions::validate() const {
             search.min_overlap, "a share in (0, 1)");
     require(search.map_width >= 32, "search.map_width", search.map_width, "at least 32 px");
     require(search.candidates >= 1, "search.candidates", search.candidates, "at least 1");
+    if (solver != Solver::adam) return;
+    if (search.mode == SearchMode::full || search.mode == SearchMode::local)
+        throw std::invalid_argument(
+            "options: solver = adam searches nothing, expected search.mode = automatic or off");
+    require(adam.epochs >= 1, "adam.epochs", adam.epochs, "at least 1");
+    require(adam.batch >= 1, "adam.batch", adam.batch, "at least 1");
+    require(adam.learning_rate > 0 && std::isfinite(adam.learning_rate), "adam.learning_rate",
+            adam.learning_rate, "a finite number > 0");
+    require(adam.fine_learning_rate > 0 && std::isfinite(adam.fine_learning_rate),
+            "adam.fine_learning_rate", adam.fine_learning_rate, "a finite number > 0");
+    require(adam.decay > 0 && adam.decay <= 1, "adam.decay", adam.decay, "a factor in (0, 1]");
+    require(adam.fine_from >= 0 && adam.fine_from <= 1, "adam.fine_from", adam.fine_from,
+            "a share in [0, 1]");
+    require(adam.translation_scales >= 1 && adam.translation_scales <= 3, "adam.translation_scales",
+            adam.translation_scales, "1 to 3");
 }
 
 std::vector<int> choose_frames(int count, int max_frames, std::uint32_t seed) {
@@ -77,9 +127,10 @@ std::vector<int> choose_frames(int count, int max_frames, std::uint32_t seed) {
 CalibrationResult calibrate(const std::vector<ImageView>& references,
                             const std::vector<ImageView>& sources,
                             const std::vector<ImageView>& depths, const std::optional<Rig>& initial,
-                            const CalibrationOptions& options, const Progress& progress) {
+                            const CalibrationOptions& options, const Progress& progress,
+                            const FlowEstimator& flow) {
     const double start = seconds_now();
-    const auto tell = [&](const char* stage, double share) {
+    const Progress tell = [&](const std::string& stage, double share) {
         if (progress) progress(stage, share);
     };
     options.validate();
@@ -105,28 +156,14 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
     report.working_width = images.references[0].width;
     report.working_height = images.references[0].height;
 
-    tell("search", 0.05);
-    const Start found = find_start(images, references[0], sources[0], initial, options,
-                                   [&](double share) { tell("search", 0.05 + 0.55 * share); });
-    report.search_seconds = found.search_seconds;
-    report.candidates = found.candidates;
-    report.levels = found.levels;
-    result.rig = found.rig;
-
-    // All frames, from the first level at which everything is free.
-    double share_limit = 0;
-    // The middle levels decide; what the coarse one leaves they find, and at the finest a step
-    // costs most.
-    const auto tolerance = [](int factor) { return factor == 2 ? 1e-6 : 1e-5; };
-    const std::vector<Step> steps = schedule(report.working_width, report.working_height);
-    for (std::size_t s = 0; s < steps.size(); ++s) {
-        if (steps[s].stage == 1) continue;
-        const Level level = make_level(images, steps[s].factor, result.rig, options.num_threads);
-        if (share_limit == 0)
-            share_limit = 0.8 * pooled(level, result.rig, options.num_threads).valid_share;
-        report.levels.push_back(solve_level(level, steps[s].stage, share_limit,
-                                            tolerance(steps[s].factor), options, result.rig));
-        tell("refine", 0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
+    if (options.solver == Solver::adam) {
+        tell("refine", 0.05);
+        result.rig = given_start(references[0], sources[0], initial, options);
+        solve_adam(
+            images, options, flow, [&](double share) { tell("refine", 0.05 + 0.9 * share); },
+            result.rig, report);
+    } else {
+        search_and_refine(images, references[0], sources[0], initial, options, flow, tell, result);
     }
     report.nec = report.levels.back().nec;
     report.valid_share = report.levels.back().valid_share;

@@ -160,8 +160,9 @@ Rig rig_from_paper(const PaperParameters& parameters, int reference_width, int r
     rig.reference = pinhole_from_paper(parameters.reference, reference_width, reference_height);
     rig.source = pinhole_from_paper(parameters.source, source_width, source_height);
     rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    constexpr double kScale = kPaperTranslationScale;
     rig.source_from_reference.translation =
-        parameters.t_fine + kPaperTranslationScale * parameters.t_coarse;
+        parameters.translation * Eigen::Vector3d(1, kScale, kScale * kScale);
     return rig;
 }
 
@@ -171,7 +172,7 @@ PaperParameters paper_from_rig(const Rig& rig) {
     parameters.reference = paper_from_pinhole(rig.reference);
     parameters.source = paper_from_pinhole(rig.source);
     parameters.quaternion = {q.w(), q.x(), q.y(), q.z()};
-    parameters.t_fine = rig.t();
+    parameters.translation.col(0) = rig.t();
     return parameters;
 }
 

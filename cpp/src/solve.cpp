@@ -3,9 +3,11 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "nec_cost.hpp"
 #include "parallel.hpp"
+#include "xcalib/warp.hpp"
 
 namespace xcalib {
 namespace {
@@ -94,17 +96,23 @@ NecValue pooled(const Level& level, const Rig& rig, int num_threads) {
     return sum;
 }
 
-LevelReport solve_level(const Level& level, int stage, double share_limit, double tolerance,
-                        const CalibrationOptions& options, Rig& rig) {
+LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow, int stage,
+                        double share_limit, double tolerance, const CalibrationOptions& options,
+                        Rig& rig) {
     const double start = seconds_now();
     SolverParameters p = solver_from_rig(rig);
     const SolverParameters held = p;
     ceres::Problem problem;
+    const Rig sizes = level.rig_at(rig);
+    const std::vector<double*> blocks = RigCost::blocks(p);
     for (std::size_t i = 0; i < level.pairs.size(); ++i)
+        problem.AddResidualBlock(new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit,
+                                             options.optimize_reference),
+                                 nullptr, blocks);
+    for (const FlowTargets& targets : flow)
         problem.AddResidualBlock(
-            new NecCost(*level.pairs[i], level.source_width, level.source_height, level.weights[i],
-                        share_limit, options.optimize_reference),
-            nullptr, NecCost::blocks(p));
+            new FlowCost(targets, options.flow_weight, options.optimize_reference), nullptr,
+            blocks);
     if (stage == 1 && options.prior_weight > 0) {
         const auto hold = [&](const double* from, int size, double delta, double* block) {
             problem.AddResidualBlock(
@@ -146,6 +154,52 @@ LevelReport solve_level(const Level& level, int stage, double share_limit, doubl
     report.valid_share = value.valid_share;
     report.seconds = seconds_now() - start;
     return report;
+}
+
+LevelReport solve_stage(const WorkingImages& images, const Level& level, int stage,
+                        double share_limit, double tolerance, const CalibrationOptions& options,
+                        const FlowEstimator& estimator, Rig& rig) {
+    const bool searches = options.search.mode != SearchMode::off;
+    if (options.flow == FlowMode::off || (options.flow == FlowMode::automatic && searches))
+        return solve_level(level, {}, stage, share_limit, tolerance, options, rig);
+    // Coarse levels are too small for patches, and may have far to go.
+    const bool coarse = level.factor >= kCoarse;
+    const int factor = coarse ? kCoarse / 2 : level.factor;
+    const int max_shift = coarse ? 48 : 24;
+    constexpr double kSettled = 0.1;  // [working px]
+    const double start = seconds_now();
+    LevelReport report;
+    for (int round = 0; round < options.flow_rounds; ++round) {
+        const Rig from = rig;
+        const std::vector<FlowTargets> flow =
+            estimate_flow(images, factor, rig, estimator, max_shift, options.num_threads);
+        const LevelReport before = report;
+        report = solve_level(level, flow, stage, share_limit, tolerance, options, rig);
+        report.iterations += before.iterations;
+        if (round > 0) report.initial_cost = before.initial_cost;
+        if (median_distance(level, from, rig) < kSettled) break;
+    }
+    report.seconds = seconds_now() - start;
+    return report;
+}
+
+double median_distance(const Level& level, const Rig& a, const Rig& b) {
+    const Reprojection to_a(level.rig_at(a)), to_b(level.rig_at(b));
+    const double scale = level.factor * level.rig_at(a).reference.fx / level.rig_at(a).source.fx;
+    std::vector<double> distances;
+    std::vector<float> ua(level.width), va(level.width), ub(level.width), vb(level.width);
+    std::vector<std::uint8_t> ok_a(level.width), ok_b(level.width);
+    for (const auto& pair : level.pairs)
+        for (int y = 0; y < level.height; y += 8) {
+            map_row(to_a, pair->depth().row(y), y, level.width, ua.data(), va.data(), ok_a.data());
+            map_row(to_b, pair->depth().row(y), y, level.width, ub.data(), vb.data(), ok_b.data());
+            for (int x = 0; x < level.width; x += 8)
+                if ((ok_a[x] | ok_b[x]) == 0)
+                    distances.push_back(scale * std::hypot(ua[x] - ub[x], va[x] - vb[x]));
+        }
+    if (distances.empty()) return INFINITY;
+    std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
+    return distances[distances.size() / 2];
 }
 
 }  // namespace xcalib

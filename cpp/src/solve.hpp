@@ -1,6 +1,7 @@
 // One solve: a stage of the paper at a level of the pyramid.
 #pragma once
 
+#include "flow_term.hpp"
 #include "working_images.hpp"
 #include "xcalib/calibrate.hpp"
 
@@ -14,7 +15,18 @@ NecValue pooled(const Level& level, const Rig& rig, int num_threads);
 // Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and prior,
 // stage 2 everything free. A pair whose valid share falls below `share_limit` is charged for it. It
 // stops where a step lowers the cost by less than the share `tolerance`.
-LevelReport solve_level(const Level& level, int stage, double share_limit, double tolerance,
-                        const CalibrationOptions& options, Rig& rig);
+LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow, int stage,
+                        double share_limit, double tolerance, const CalibrationOptions& options,
+                        Rig& rig);
+
+// The same, with the flow term of Eq. (total_loss) where the options have it: flow is estimated
+// where `rig` is, held while the solver moves, and estimated anew.
+LevelReport solve_stage(const WorkingImages& images, const Level& level, int stage,
+                        double share_limit, double tolerance, const CalibrationOptions& options,
+                        const FlowEstimator& estimator, Rig& rig);
+
+// Median distance between where two rigs send the pixels of a level, in reference pixels of the
+// working size.
+double median_distance(const Level& level, const Rig& a, const Rig& b);
 
 }  // namespace xcalib

@@ -255,9 +255,24 @@ std::vector<Step> schedule(int width, int height) {
     return steps;
 }
 
+Rig given_start(const ImageView& reference, const ImageView& source,
+                const std::optional<Rig>& initial, const CalibrationOptions& options) {
+    Rig rig;
+    if (initial) {
+        rig = *initial;
+    } else {
+        rig.reference = camera_guess(reference, options.reference_hfov_deg.value_or(45) * kDegree);
+        rig.source = camera_guess(source, 45 * kDegree);
+    }
+    rig.reference = options.reference_camera.value_or(rig.reference);
+    rig.source = options.source_camera.value_or(rig.source);
+    return rig;
+}
+
 Start find_start(const WorkingImages& all_images, const ImageView& reference,
                  const ImageView& source, const std::optional<Rig>& initial,
-                 const CalibrationOptions& options, const std::function<void(double)>& progress) {
+                 const CalibrationOptions& options, const FlowEstimator& flow,
+                 const std::function<void(double)>& progress) {
     constexpr std::size_t kFrames = 12;
     const WorkingImages images = some_frames(all_images, kFrames);
     const int num_threads = options.num_threads;
@@ -271,13 +286,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
                               search_space(reference, source, initial, options), num_threads);
     } else {
         SearchCandidate given;
-        given.rig.reference = options.reference_camera.value_or(
-            initial ? initial->reference
-                    : camera_guess(reference, options.reference_hfov_deg.value_or(45) * kDegree));
-        given.rig.source = options.source_camera.value_or(
-            initial ? initial->source : camera_guess(source, 45 * kDegree));
-        if (initial)
-            given.rig.source_from_reference.rotation = initial->source_from_reference.rotation;
+        given.rig = given_start(reference, source, initial, options);
         found = {given};
     }
     if (found.empty())
@@ -320,13 +329,17 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
 
     // Halving: each level costs four times the last, and tells more.
     for (std::size_t s = 0; s + 1 < steps.size() || s == 0; ++s) {
-        if (s > 0 && steps[s].factor == 1) break;
+        // With one candidate nothing is to be compared: the refinement does the rest.
+        if (s > 0 && (steps[s].factor == 1 || (!searches && steps[s].stage == 2))) break;
         if (s == 0 || steps[s].factor != steps[s - 1].factor)
             keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
-            candidate.levels.push_back(solve_level(level, steps[s].stage, candidate.share_limit,
-                                                   kTolerance, quick, candidate.rig));
+            candidate.levels.push_back(
+                searches ? solve_level(level, {}, steps[s].stage, candidate.share_limit, kTolerance,
+                                       quick, candidate.rig)
+                         : solve_stage(images, level, steps[s].stage, candidate.share_limit,
+                                       kTolerance, quick, flow, candidate.rig));
             candidate.merit = merit(pooled(level, candidate.rig, num_threads));
             out.candidates[candidate.entry].refined = candidate.rig;
             out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;

@@ -27,9 +27,14 @@ struct Start {
     double search_seconds = 0.0;
 };
 
+// Where nothing is searched: the initial rig, or the paper's start, 45 deg and the identity; known
+// cameras are taken as they are.
+Rig given_start(const ImageView& reference, const ImageView& source,
+                const std::optional<Rig>& initial, const CalibrationOptions& options);
+
 // `reference` and `source` give the sizes of the cameras.
 Start find_start(const WorkingImages& images, const ImageView& reference, const ImageView& source,
                  const std::optional<Rig>& initial, const CalibrationOptions& options,
-                 const std::function<void(double)>& progress);
+                 const FlowEstimator& flow, const std::function<void(double)>& progress);
 
 }  // namespace xcalib

@@ -6,7 +6,6 @@
 
 #include "format.hpp"
 #include "solve.hpp"
-#include "xcalib/warp.hpp"
 
 namespace xcalib {
 namespace {
@@ -56,27 +55,6 @@ Level half_of(const Level& level, std::size_t first) {
     return half;
 }
 
-// Median distance between where two rigs send the pixels of a level, in reference pixels of the
-// working size.
-double median_distance(const Level& level, const Rig& a, const Rig& b) {
-    const Reprojection to_a(level.rig_at(a)), to_b(level.rig_at(b));
-    const double scale = level.factor * level.rig_at(a).reference.fx / level.rig_at(a).source.fx;
-    std::vector<double> distances;
-    std::vector<float> ua(level.width), va(level.width), ub(level.width), vb(level.width);
-    std::vector<std::uint8_t> ok_a(level.width), ok_b(level.width);
-    for (const auto& pair : level.pairs)
-        for (int y = 0; y < level.height; y += 8) {
-            map_row(to_a, pair->depth().row(y), y, level.width, ua.data(), va.data(), ok_a.data());
-            map_row(to_b, pair->depth().row(y), y, level.width, ub.data(), vb.data(), ok_b.data());
-            for (int x = 0; x < level.width; x += 8)
-                if ((ok_a[x] | ok_b[x]) == 0)
-                    distances.push_back(scale * std::hypot(ua[x] - ub[x], va[x] - vb[x]));
-        }
-    if (distances.empty()) return INFINITY;
-    std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
-    return distances[distances.size() / 2];
-}
-
 }  // namespace
 
 void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
@@ -95,7 +73,7 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
         quick.max_iterations = std::min(options.max_iterations, 12);
         Rig halves[2] = {rig, rig};
         for (std::size_t k = 0; k < 2; ++k)
-            solve_level(half_of(level, k), 2, 0.8 * report.valid_share, 1e-5, quick, halves[k]);
+            solve_level(half_of(level, k), {}, 2, 0.8 * report.valid_share, 1e-5, quick, halves[k]);
         report.repeatability_px = median_distance(level, halves[0], halves[1]);
     }
 

@@ -211,6 +211,11 @@ Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, in
     return level;
 }
 
+Level make_sizes(const WorkingImages& images, int factor, const Rig& rig) {
+    const Image& source = images.sources[0];
+    return level_for(images, factor, source.width, source.height, 1.0, rig);
+}
+
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads) {
     if (factor < kCoarse) return make_nec_level(images, factor, rig, num_threads);
     const EdgeMap& source = images.source_edges[0];

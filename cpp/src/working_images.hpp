@@ -54,6 +54,8 @@ struct Level {
     }
 };
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
+// Its sizes only, for sources no finer than the reference.
+Level make_sizes(const WorkingImages& images, int factor, const Rig& rig);
 // The same with the NEC at any factor.
 Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 

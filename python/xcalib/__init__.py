@@ -9,6 +9,7 @@ from importlib.metadata import version as _version
 
 from xcalib import metrics
 from xcalib._core import (
+    AdamOptions,
     CalibrationOptions,
     CalibrationReport,
     CalibrationResult,
@@ -25,6 +26,7 @@ from xcalib._core import (
 __version__ = _version("xcalib-rgbt")
 
 __all__ = [
+    "AdamOptions",
     "CalibrationOptions",
     "CalibrationReport",
     "CalibrationResult",

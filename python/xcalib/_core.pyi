@@ -113,6 +113,26 @@ class SearchOptions:
 
     def __init__(self, **kwargs: Any) -> None: ...
 
+class AdamOptions:
+    """The published schedule. Keyword arguments set fields."""
+
+    epochs: int
+    """>= 1"""
+    batch: int
+    """Pairs, >= 1."""
+    learning_rate: float
+    """Of stage 1, > 0."""
+    fine_learning_rate: float
+    """Of stage 2, > 0."""
+    decay: float
+    """Of either by a step, in (0, 1]."""
+    fine_from: float
+    """Share of all steps at which stage 2 begins, in [0, 1]."""
+    translation_scales: int
+    """Of Eq. (translation), 1 to 3."""
+
+    def __init__(self, **kwargs: Any) -> None: ...
+
 class CalibrationOptions:
     """Options of calibrate(). Keyword arguments set fields."""
 
@@ -128,6 +148,12 @@ class CalibrationOptions:
     """Per stage and level; >= 1."""
     prior_weight: float
     """gamma of Eq. (total_loss), in stage 1; >= 0."""
+    flow: str
+    """The flow term: 'auto' (where nothing is searched), 'on' or 'off'."""
+    flow_weight: float
+    """lambda of Eq. (total_loss); > 0."""
+    flow_rounds: int
+    """Times at most that a stage at a level estimates flow; >= 1."""
     reference_camera: Pinhole | None
     """Known intrinsics, frozen, or None."""
     source_camera: Pinhole | None
@@ -138,6 +164,10 @@ class CalibrationOptions:
     """Free the reference's intrinsics too; they are coupled with the source's."""
     search: SearchOptions
     """SearchOptions."""
+    solver: str
+    """'ceres', or 'adam' as published, which searches nothing."""
+    adam: AdamOptions
+    """AdamOptions."""
 
     def __init__(self, **kwargs: Any) -> None: ...
     def validate(self) -> None:
@@ -206,6 +236,24 @@ class CandidateReport:
     def refined(self) -> Rig:
         """Rig, after the coarse levels."""
 
+class AdamStep:
+    """Before a step of Adam is taken: means over its batch."""
+    @property
+    def learning_rate(self) -> float:
+        """Of the step."""
+    @property
+    def image(self) -> float:
+        """Eq. (image_loss)."""
+    @property
+    def flow(self) -> float:
+        """Eq. (flow_loss), in half widths of the reference."""
+    @property
+    def prior(self) -> float:
+        """Eq. (camera_regularization)."""
+    @property
+    def total(self) -> float:
+        """Eq. (total_loss)."""
+
 class CalibrationReport:
     """How a calibration went."""
     @property
@@ -250,6 +298,9 @@ class CalibrationReport:
     @property
     def levels(self) -> list[LevelReport]:
         """In the order solved."""
+    @property
+    def steps(self) -> list[AdamStep]:
+        """AdamStep, of solver 'adam'."""
     def brief(self) -> str:
         """One line."""
     def full(self) -> str:
@@ -279,13 +330,18 @@ def calibrate(
     initial: Rig | None = None,
     options: CalibrationOptions = ...,
     progress: Callable[[str, float], object] | None = None,
+    flow: Callable[
+        [NDArray[float32], NDArray[float32], NDArray[uint8]], tuple[NDArray[Any], NDArray[Any]]
+    ]
+    | None = None,
 ) -> CalibrationResult:
     """Estimates the rig from footage and depth, without a target.
 
     references, sources: sequences of (H, W) or (H, W, 3) uint8 | uint16 | float32 images,
     pairs by index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN /
     inf unknown. initial: Rig to start from. progress: called with (stage, share of the work
-    done). Images are copied only where their rows are not contiguous.
+    done). flow: a provider as in xcalib.flow, for the flow term; None is the built-in patch
+    flow. Images are copied only where their rows are not contiguous.
 
     Raises ValueError, naming the frame, on unusable input. Not to converge is a result: see
     CalibrationResult.converged.
@@ -294,9 +350,9 @@ def calibrate(
 class Registrar:
     """One rig, a stream of frames, Eq. (warping).
 
-    num_threads: 0 uses every core. nearest: register() takes the source pixel next to the point
-    as it is, instead of interpolating between four, so that radiometric counts are never mixed.
-    Raises ValueError where the rig is not valid.
+    num_threads: 0 uses every core. nearest: register() takes the source pixel next to the
+    point as it is, instead of interpolating between four, so that radiometric counts are
+    never mixed. Raises ValueError where the rig is not valid.
     """
     def __init__(self, rig: Rig, num_threads: int = 0, nearest: bool = False) -> None: ...
     @property

@@ -23,6 +23,7 @@ from .cli_options import options
 from .demo import run_demo
 from .depth.options import DEPTH_OPTIONS
 from .evaluate import evaluate
+from .flow import FlowProvider, NetworkFlow
 from .footage import camera_infos, is_bag, is_video
 from .footage.options import FOOTAGE_OPTIONS
 from .frames import (
@@ -100,6 +101,17 @@ def intrinsics(
     if not (fx > 0 and fy > 0 and all(map(math.isfinite, (fx, fy, cx, cy)))):
         raise click.BadParameter(f"{value!r}: expected finite numbers, FX and FY above 0 px")
     return fx, fy, cx, cy
+
+
+def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
+    """What ``--flow`` says: the mode of the options, and the provider, None for the built-in."""
+    if spec in ("auto", "off"):
+        return spec, None
+    if spec == "patch":
+        return "on", None
+    if not spec.endswith(".onnx"):
+        raise click.UsageError(f"--flow is {spec!r}, expected auto, off, patch or a .onnx file")
+    return "on", NetworkFlow(spec)
 
 
 frames_arguments = options(
@@ -207,6 +219,22 @@ def cli() -> None:
     help="Global search before refinement: full, local (around the initial rig), off, or auto.",
 )
 @click.option(
+    "--flow",
+    "flow_spec",
+    metavar="auto|off|patch|MODEL.onnx",
+    default="auto",
+    show_default=True,
+    help="The flow term: patch, built in, or a network of two images; auto is patch where nothing"
+    " is searched.",
+)
+@click.option(
+    "--solver",
+    type=click.Choice(["ceres", "adam"]),
+    default=DEFAULTS.solver,
+    show_default=True,
+    help="adam is the paper's, which searches nothing.",
+)
+@click.option(
     "--reference-intrinsics",
     metavar="FX,FY,CX,CY",
     callback=intrinsics,
@@ -264,6 +292,8 @@ def calibrate_command(
     threads: int,
     initial: Path | None,
     search: str,
+    flow_spec: str,
+    solver: str,
     reference_intrinsics: tuple[float, float, float, float] | None,
     source_intrinsics: tuple[float, float, float, float] | None,
     reference_hfov: float | None,
@@ -298,6 +328,9 @@ def calibrate_command(
         optimize_reference=optimize_reference,
     )
     calibration.search.mode = search
+    calibration.solver = solver
+    calibration.validate()
+    calibration.flow, flow = flow_of(flow_spec)
 
     def set_cameras(calibration: CalibrationOptions, reference: Image, source: Image) -> None:
         if reference_intrinsics:
@@ -327,7 +360,7 @@ def calibrate_command(
             warn(left_out(len(choice.unusable), why))
         indices = choice.indices
     result, chosen = run_calibration(
-        frames, calibration, initial_rig, quiet, set_cameras, indices, warn
+        frames, calibration, initial_rig, quiet, set_cameras, indices, warn, flow
     )
     if refine_plane:
         frames, plane = with_fitted_plane(frames, result.rig, chosen, calibration, quiet)

@@ -28,6 +28,7 @@ from .depth import (
     PlaneDepth,
 )
 from .depth.plane_fit import fit_plane, spread
+from .flow import FlowProvider
 from .footage import Matching, Stream, open_pairs, open_sink
 from .footage.opening import PickedDepth
 from .footage.pairing import median_period
@@ -141,12 +142,14 @@ def run_calibration(
     prepare: Callable[[CalibrationOptions, Image, Image], None] | None = None,
     chosen: Sequence[int] | None = None,
     warn: Callable[[str], None] = warnings.warn,
+    flow: FlowProvider | None = None,
 ) -> tuple[CalibrationResult, list[int]]:
     """Load the chosen frames and calibrate; returns the indices of the frames used as well.
 
     ``prepare`` completes the options once the images, and so their sizes, are known. Without
     ``chosen`` the frames are spread over the footage by the seed. Frames that cannot be decoded
     are left out, and ``warn`` is told how many; if none is left, `InputError` names the first.
+    ``flow`` is a provider for the flow term, None the built-in one.
     """
     if chosen is None:
         chosen = choose_frames(len(frames), calibration.max_frames, calibration.seed)
@@ -181,7 +184,7 @@ def run_calibration(
             bar.update(fraction - bar.n)
 
         try:
-            result = calibrate(references, sources, depths, initial, calibration, show)
+            result = calibrate(references, sources, depths, initial, calibration, show, flow)
         except ValueError as error:
             raise InputError(_with_file_name(str(error), frames.references, chosen)) from None
     return result, chosen

@@ -215,8 +215,8 @@ TEST(PaperParameters, FocalParametersScaleTheAngleOfView) {
 TEST(PaperParameters, CoarseTranslationWeighsTenTimesTheFine) {
     EXPECT_EQ(kPaperTranslationScale, 10);
     PaperParameters parameters;
-    parameters.t_fine = {1, 2, 3};
-    parameters.t_coarse = {0.1, 0.2, -0.3};
+    parameters.translation.col(0) = Eigen::Vector3d(1, 2, 3);
+    parameters.translation.col(1) = Eigen::Vector3d(0.1, 0.2, -0.3);
     const Rig rig = rig_from_paper(parameters, 640, 480, 320, 256);
     EXPECT_LT((rig.t() - Eigen::Vector3d(2, 4, 0)).norm(), 1e-14);
 }
@@ -240,7 +240,7 @@ TEST(PaperParameters, ConvertBothWays) {
         expect_same(rig_from_paper(paper_from_rig(rig), 640, 480, 320, 256), rig, 1e-9);
 
         PaperParameters parameters = paper_from_rig(rig);
-        parameters.t_coarse = {0.01, -0.02, 0.005};
+        parameters.translation.col(1) = Eigen::Vector3d(0.01, -0.02, 0.005);
         const PaperParameters back = paper_from_rig(rig_from_paper(parameters, 640, 480, 320, 256));
         EXPECT_NEAR(back.source.fx, parameters.source.fx, 1e-12);
         EXPECT_NEAR(back.source.fy, parameters.source.fy, 1e-12);
@@ -248,7 +248,9 @@ TEST(PaperParameters, ConvertBothWays) {
         EXPECT_NEAR(back.reference.cy, parameters.reference.cy, 1e-12);
         EXPECT_NEAR(back.reference.skew, parameters.reference.skew, 1e-12);
         EXPECT_LT((back.quaternion - parameters.quaternion).norm(), 1e-12);
-        EXPECT_LT((back.t_fine - parameters.t_fine - 10 * parameters.t_coarse).norm(), 1e-12);
+        EXPECT_LT(
+            (back.translation.col(0) - parameters.translation * Eigen::Vector3d(1, 10, 100)).norm(),
+            1e-12);
     }
 }
 

@@ -137,9 +137,8 @@ struct OnePair {
 
     OnePair(const NecFrame& frame, const Rig& rig, double weight, bool with_reference)
         : parameters(solver_from_rig(rig)), pair(frame) {
-        problem.AddResidualBlock(
-            new NecCost(pair, rig.source.width, rig.source.height, weight, 0.0, with_reference),
-            nullptr, NecCost::blocks(parameters));
+        problem.AddResidualBlock(new NecCost(pair, rig, weight, 0.0, with_reference), nullptr,
+                                 NecCost::blocks(parameters));
         problem.SetManifold(parameters.quaternion, new ceres::QuaternionManifold);
     }
 
@@ -249,8 +248,7 @@ TEST(NecCost, APairThatLosesItsOverlapIsChargedForIt) {
     std::vector<const double*> blocks;
     for (const double* block : NecCost::blocks(p)) blocks.push_back(block);
     const auto cost_with = [&](double minimum_share) {
-        const NecCost cost(images, away.source.width, away.source.height, 1.0, minimum_share,
-                           false);
+        const NecCost cost(images, away, 1.0, minimum_share, false);
         std::vector<double> residuals(cost.num_residuals());
         EXPECT_TRUE(cost.Evaluate(blocks.data(), residuals.data(), nullptr));
         double sum = 0;
@@ -265,7 +263,7 @@ TEST(NecCost, APairThatLosesItsOverlapIsChargedForIt) {
 TEST(NecCost, BlocksThatAreNotAskedForMayBeLeftOut) {
     const Scene scene = smooth_scene(7, 1, 80, 60);
     const NecPair images(scene.frame);
-    const NecCost cost(images, scene.rig.source.width, scene.rig.source.height, 1.0, 0.0, true);
+    const NecCost cost(images, scene.rig, 1.0, 0.0, true);
     SolverParameters p = solver_from_rig(scene.rig);
     std::vector<const double*> blocks;
     for (const double* block : NecCost::blocks(p)) blocks.push_back(block);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "xcalib/camera.hpp"
+#include "xcalib/flow.hpp"
 #include "xcalib/image.hpp"
 
 namespace xcalib {
@@ -19,6 +20,28 @@ enum class SearchMode {
     full,       // any displacement, ratio of fields of view and roll below
     local,      // around the initial rig: 15 % of its width, 15 % of its scale, 3 deg of roll
     off,        // start at the initial rig, or at the paper's 45 deg where there is none
+};
+
+enum class FlowMode {
+    automatic,  // on where nothing is searched: it leads from further off than edges do
+    on,         // in every stage; after a search it changes little
+    off,
+};
+
+enum class Solver {
+    ceres,  // Levenberg-Marquardt on a pyramid, after a search
+    adam,   // the paper's, from the initial rig or its 45 deg start; nothing is searched
+};
+
+// The published schedule.
+struct AdamOptions {
+    int epochs = 15;                   // >= 1
+    int batch = 4;                     // pairs, >= 1
+    double learning_rate = 5e-3;       // of stage 1, > 0
+    double fine_learning_rate = 5e-4;  // of stage 2, > 0
+    double decay = 0.98;               // of either by a step, (0, 1]
+    double fine_from = 0.75;           // of all steps, where stage 2 begins, [0, 1]
+    int translation_scales = 2;        // of Eq. (translation), 1 to 3
 };
 
 struct SearchOptions {
@@ -37,6 +60,9 @@ struct CalibrationOptions {
     int working_width = 640;    // [px]: references are reduced by a whole factor to at most this
     int max_iterations = 100;   // per stage and level, >= 1
     double prior_weight = 1.0;  // gamma of Eq. (total_loss), stage 1 only, >= 0
+    FlowMode flow = FlowMode::automatic;  // the flow term
+    double flow_weight = 2.5;             // lambda of Eq. (total_loss), > 0
+    int flow_rounds = 3;                  // times at most that a stage estimates flow, >= 1
 
     // Known intrinsics are taken as they are and frozen.
     std::optional<Pinhole> reference_camera;
@@ -47,6 +73,8 @@ struct CalibrationOptions {
     bool optimize_reference = false;
 
     SearchOptions search;
+    Solver solver = Solver::ceres;
+    AdamOptions adam;
 
     void validate() const;  // throws std::invalid_argument: field, value, range
 };
@@ -72,6 +100,15 @@ struct CandidateReport {
     Rig refined;                                           // after refinement at the coarse level
 };
 
+// A step of Adam, before it is taken: means over its batch.
+struct AdamStep {
+    double learning_rate = 0.0;
+    double image = 0.0;  // Eq. (image_loss)
+    double flow = 0.0;   // of Eq. (flow_loss), in half widths of the reference
+    double prior = 0.0;  // Eq. (camera_regularization)
+    double total = 0.0;  // Eq. (total_loss)
+};
+
 struct CalibrationReport {
     bool converged = false;
     std::string message;  // one line: why the result is, or is not, to be trusted
@@ -86,6 +123,7 @@ struct CalibrationReport {
     std::vector<int> frames;  // indices of the pairs used
     std::vector<CandidateReport> candidates;
     std::vector<LevelReport> levels;
+    std::vector<AdamStep> steps;  // of Solver::adam
 
     std::string brief() const;  // one line
     std::string full() const;   // a table
@@ -100,6 +138,11 @@ struct CalibrationResult {
 // Called with the stage and the share of all work done, (0, 1], from the calling thread.
 using Progress = std::function<void(const std::string&, double)>;
 
+// Flow from a reference, gray and normalized, to the warped source, gray too; both in [0, 1] and of
+// one size. `valid`: nonzero where the warped source is. Called from the calling thread.
+using FlowEstimator = std::function<FlowField(const Image& reference, const Image& warped,
+                                              const std::vector<std::uint8_t>& valid)>;
+
 // `max_frames` of `count` indices, spread over the whole, drawn with `seed`; sorted.
 std::vector<int> choose_frames(int count, int max_frames, std::uint32_t seed);
 
@@ -111,6 +154,7 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
                             const std::vector<ImageView>& depths,
                             const std::optional<Rig>& initial = std::nullopt,
                             const CalibrationOptions& options = {},
-                            const Progress& progress = nullptr);
+                            const Progress& progress = nullptr,
+                            const FlowEstimator& flow = nullptr);
 
 }  // namespace xcalib

@@ -77,15 +77,16 @@ struct PaperParameters {
     Camera reference;
     Camera source;
     Eigen::Vector4d quaternion = Eigen::Vector4d(1, 0, 0, 0);  // w x y z, any norm but 0
-    Eigen::Vector3d t_fine = Eigen::Vector3d::Zero();          // Eq. (translation), [m]
-    Eigen::Vector3d t_coarse = Eigen::Vector3d::Zero();        // Eq. (translation), [lambda_t m]
+    // Eq. (translation): column k in lambda_t^k m. The paper has the first two, and tries all
+    // three.
+    Eigen::Matrix3d translation = Eigen::Matrix3d::Zero();
 };
 
 inline constexpr double kPaperTranslationScale = 10.0;  // lambda_t
 
 Rig rig_from_paper(const PaperParameters& parameters, int reference_width, int reference_height,
                    int source_width, int source_height);
-// The translation goes to the fine component whole: the split is not unique.
+// The translation goes to the finest component whole: the split is not unique.
 PaperParameters paper_from_rig(const Rig& rig);
 
 // The solver's parameterization: every number is dimensionless or in metres, of order one, and the
