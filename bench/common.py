@@ -1,4 +1,10 @@
-"""What the benchmarks share: where the data is, what machine this is, how a mapping is compared."""
+"""What the benchmarks share: where the data is, what machine this is, how a mapping is compared.
+
+No data is part of the repository. Where it is from: lynred_night, the night rig, frames of
+Azorgz/Disparity_Pipeline (no licence stated); roadscene, hanna-xu/RoadScene; kitti, three frames of
+kuixu/kitti_object_vis (CC BY-NC-SA); motorcycle, Middlebury 2014 as scikit-image ships it;
+flir_adas, two pairs of Tarpit59/thermal-rgb-aligner.
+"""
 
 import os
 import platform

@@ -1,4 +1,7 @@
-"""Every benchmark, one after the other. Each prints the machine, the commit and its figures."""
+"""The benchmarks, one after the other. Each prints the machine, the commit and its figures.
+
+Not among them, for they take long: frame_choice.
+"""
 
 import subprocess
 import sys
@@ -9,6 +12,7 @@ for name in (
     "night_rig",
     "flir_rig",
     "synthetic_rigs",
+    "depth_measured",
     "depth_completion",
     "depth_conditioning",
     "patch_flow",
