@@ -42,8 +42,8 @@ HWY_INLINE Whole floor_or_below(Float value) {
     const Float shifted = hn::Add(hn::Sub(value, set(0.5)), set(kLarge));
     return {hn::Sub(shifted, set(kLarge)), hn::BitCast(IntTag(), shifted)};
 }
-HWY_INLINE Int to_integer(Float whole) {
-    return hn::Sub(hn::BitCast(IntTag(), hn::Add(whole, set(kLarge))), set(kLargeBits));
+HWY_INLINE Int to_integer(Float value) {  // the nearest
+    return hn::Sub(hn::BitCast(IntTag(), hn::Add(value, set(kLarge))), set(kLargeBits));
 }
 
 // -- Where a pixel lies in the source, Eq. (3d_mapping) ------------------------------------------
@@ -372,8 +372,7 @@ HWY_INLINE void store(Float value, float* out) { hn::StoreU(value, FloatTag(), o
 template <class T>
 HWY_INLINE void store(Float value, T* out) {  // a mean of values in range is in range
     const hn::Rebind<T, FloatTag> d;
-    const Int rounded = hn::ConvertTo(IntTag(), hn::Add(value, set(0.5)));
-    hn::StoreU(hn::DemoteTo(d, rounded), d, out);
+    hn::StoreU(hn::DemoteTo(d, to_integer(value)), d, out);  // which rounds
 }
 
 HWY_INLINE void store_pixels(const Float (&values)[1], float* out) { store(values[0], out); }
@@ -488,8 +487,8 @@ template <class T, int kChannels>
 HWY_INLINE void sample_nearest(const Source& source, const Points& p, Mask valid, T* out) {
     const IntTag di;
     HWY_ALIGN std::int32_t x[kLanes], y[kLanes], ok[kLanes];
-    hn::Store(hn::ConvertTo(di, hn::Add(p.u, set(0.5))), di, x);
-    hn::Store(hn::ConvertTo(di, hn::Add(p.v, set(0.5))), di, y);
+    hn::Store(to_integer(p.u), di, x);
+    hn::Store(to_integer(p.v), di, y);
     hn::Store(hn::VecFromMask(di, hn::RebindMask(di, valid)), di, ok);
     for (int i = 0; i < kLanes; ++i)
         for (int c = 0; c < kChannels; ++c)
