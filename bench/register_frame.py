@@ -1,6 +1,12 @@
-"""One 1280x960 frame from a 640x512 float32 source, one thread, against numpy + cv2.remap."""
+"""One 1280x960 frame from a 640x512 source, against what one would write instead, and a plain copy.
+
+The depth changes with every frame. Each round runs every contestant once, on the same depth; a
+ratio is the median over the rounds of the ratio within a round, so that the machine's mood cancels.
+All write to arrays that exist, where their interface lets them. Threads: one, unless said.
+"""
 
 import time
+from collections.abc import Callable
 
 import cv2
 import numpy as np
@@ -8,47 +14,139 @@ from common import machine
 
 import xcalib
 
+ROUNDS = 150
+WIDTH, HEIGHT = 1280, 960
+
+
+def depths() -> list[np.ndarray]:
+    """A road with posts: smooth with steps, as depth is, and other heights each frame."""
+    row = np.arange(HEIGHT, dtype=np.float32)[:, None] - 400
+    out = []
+    for i in range(4):
+        height = 1.4 + 0.1 * i
+        road = np.where(row > 0, height * 1370 / np.maximum(row, 1), 80)
+        depth = np.broadcast_to(road, (HEIGHT, WIDTH)).clip(0, 80).astype(np.float32)
+        for post in range(8):
+            x = 60 + 150 * post + 15 * i
+            depth[200 : 500 + 30 * post, x : x + 40] = 6 + 2 * post
+        out.append(depth)
+    return out
+
+
+def torch_peer(rig: xcalib.Rig, source: np.ndarray) -> Callable[[np.ndarray], object] | None:
+    """Map and grid_sample in PyTorch; None, said, where it is not installed."""
+    try:
+        import torch
+    except ImportError:
+        print("skipped: PyTorch is not installed")
+        return None
+    torch.set_num_threads(1)
+    y, x = torch.meshgrid(
+        torch.arange(HEIGHT, dtype=torch.float32),
+        torch.arange(WIDTH, dtype=torch.float32),
+        indexing="ij",
+    )
+    h = torch.from_numpy(rig.infinite_homography.astype(np.float32))
+    k = torch.from_numpy((rig.source.K @ rig.t).astype(np.float32))
+    rays = [h[i, 0] * x + h[i, 1] * y + h[i, 2] for i in range(3)]
+    image = torch.from_numpy(source)[None, None]
+    scale = 2 / (source.shape[1] - 1), 2 / (source.shape[0] - 1)
+
+    def run(depth: np.ndarray) -> object:
+        d = torch.from_numpy(depth)
+        u, v, z = (d * ray + k[i] for i, ray in enumerate(rays))
+        grid = torch.stack([u / z * scale[0] - 1, v / z * scale[1] - 1], -1)[None]
+        with torch.no_grad():
+            return torch.nn.functional.grid_sample(image, grid, align_corners=True)
+
+    return run
+
+
+def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object]]:
+    """Name and call; a call takes the depth and which of the four it is."""
+    rng = np.random.default_rng(0)
+    source = rng.random((rig.source.height, rig.source.width), dtype=np.float32)
+    counts = (255 * source).astype(np.uint8)
+    colour = rng.integers(0, 256, (*source.shape, 3), np.uint8)
+    wide = (65535 * source).astype(np.uint16)
+    mask = np.empty((HEIGHT, WIDTH), np.uint8)
+
+    def ours(image: np.ndarray, **options: object) -> Callable[[np.ndarray, int], object]:
+        registrar = xcalib.Registrar(rig, **{"num_threads": 1, "occlusion": False, **options})
+        out = np.empty((HEIGHT, WIDTH, *image.shape[2:]), image.dtype)
+        return lambda depth, _: registrar.register(image, depth, out=out, mask=mask)
+
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH].astype(np.float32)
+    h = rig.infinite_homography.astype(np.float32)
+    k = (rig.source.K @ rig.t).astype(np.float32)
+    rays = [h[i, 0] * x + h[i, 1] * y + h[i, 2] for i in range(3)]
+    out, copied = np.empty((HEIGHT, WIDTH), np.float32), np.empty((HEIGHT, WIDTH), np.float32)
+
+    def numpy_map(depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        z = depth * rays[2] + k[2]
+        return (depth * rays[0] + k[0]) / z, (depth * rays[1] + k[1]) / z
+
+    ready = [numpy_map(depth) for depth in depths()]
+    units = [np.rint(256 * depth).astype(np.uint16) for depth in depths()]
+    kitti = ours(source, depth_scale=1 / 256)
+    calls: dict[str, Callable[[np.ndarray, int], object]] = {
+        "float32": ours(source),
+        "float32, occlusion": ours(source, occlusion=True),
+        "float32, two threads": ours(source, num_threads=2),
+        "float32, occlusion, two threads": ours(source, occlusion=True, num_threads=2),
+        "float32, uint16 depth": lambda _, i: kitti(units[i], i),
+        "uint8": ours(counts),
+        "uint16": ours(wide),
+        "uint8, colour": ours(colour),
+        "numpy map + cv2.remap": lambda d, _: cv2.remap(
+            source, *numpy_map(d), cv2.INTER_LINEAR, dst=out
+        ),
+        "cv2.remap, map ready": lambda _, i: cv2.remap(
+            source, *ready[i], cv2.INTER_LINEAR, dst=out
+        ),
+        "copy": lambda d, _: np.copyto(copied, d),
+    }
+    peer = torch_peer(rig, source)
+    if peer is not None:
+        calls["PyTorch map + grid_sample"] = lambda d, _: peer(d)
+    return calls
+
 
 def main() -> None:
     print(machine())
     cv2.setNumThreads(1)
-    rng = np.random.default_rng(0)
-    reference = xcalib.Pinhole.from_hfov(1280, 960, 50)
+    reference = xcalib.Pinhole.from_hfov(WIDTH, HEIGHT, 50)
     rig = xcalib.Rig(reference, xcalib.Pinhole.from_hfov(640, 512, 48), t=[-0.13, 0.01, 0.02])
-    registrar = xcalib.Registrar(rig, num_threads=1)
-    source = rng.random((512, 640), dtype=np.float32)
-    # A road, another height each frame: like real depth it is smooth, which caches like.
-    row = np.arange(960, dtype=np.float32)[:, None] - 400
-    depths = [
-        np.broadcast_to(np.where(row > 0, height * 1370 / np.maximum(row, 1), 80), (960, 1280))
-        .clip(0, 80)
-        .astype(np.float32)
-        for height in (1.4, 1.5, 1.6, 1.7)
-    ]
-    y, x = np.mgrid[0:960, 0:1280].astype(np.float32)
-    h = rig.infinite_homography.astype(np.float32)
-    k = (rig.source.K @ rig.t).astype(np.float32)
+    calls, frames = contestants(rig), depths()
+    times: dict[str, list[float]] = {name: [] for name in calls}
+    for i in range(ROUNDS + 5):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            call(frames[i % 4], i % 4)
+            if i >= 5:
+                times[name].append(time.perf_counter() - start)
+    for name, values in times.items():
+        low, median, high = 1e3 * np.percentile(values, [10, 50, 90])
+        print(f"{name:32s} {median:6.2f} ms ({low:.2f}-{high:.2f})")
 
-    def peer(depth: np.ndarray) -> np.ndarray:
-        z = depth * (h[2, 0] * x + h[2, 1] * y + h[2, 2]) + k[2]
-        u = (depth * (h[0, 0] * x + h[0, 1] * y + h[0, 2]) + k[0]) / z
-        v = (depth * (h[1, 0] * x + h[1, 1] * y + h[1, 2]) + k[1]) / z
-        return cv2.remap(source, u, v, cv2.INTER_LINEAR)
+    def ratio(text: str, above: str, below: str) -> None:
+        if above not in times:
+            return
+        values = np.array(times[above]) / np.array(times[below])
+        low, median, high = np.percentile(values, [10, 50, 90])
+        print(f"{text:58s} {median:5.2f} ({low:.2f}-{high:.2f})")
 
-    ours, theirs = [], []
-    for i in range(60):  # in pairs, so that the machine's mood cancels
-        depth = depths[i % 4]
-        start = time.perf_counter()
-        registrar.register(source, depth)
-        middle = time.perf_counter()
-        peer(depth)
-        ours.append(middle - start)
-        theirs.append(time.perf_counter() - middle)
-    ratio = np.array(theirs) / np.array(ours)
-    print(
-        f"Registrar.register {np.median(ours) * 1e3:.2f} ms, numpy map + cv2.remap "
-        f"{np.median(theirs) * 1e3:.2f} ms; ratio {np.median(ratio):.2f} "
-        f"({np.percentile(ratio, 10):.2f}-{np.percentile(ratio, 90):.2f})"
+    ratio("numpy map + cv2.remap takes, times ours", "numpy map + cv2.remap", "float32")
+    ratio("PyTorch map + grid_sample takes, times ours", "PyTorch map + grid_sample", "float32")
+    ratio("ours takes, times cv2.remap with the map ready", "float32", "cv2.remap, map ready")
+    ratio("ours takes, times a copy", "float32", "copy")
+    ratio("ours with occlusion takes, times a copy", "float32, occlusion", "copy")
+    ratio("float32 takes, times uint8", "float32", "uint8")
+    ratio("one thread takes, times two", "float32", "float32, two threads")
+    ratio(
+        "one thread takes, times two, with occlusion",
+        "float32, occlusion",
+        "float32, occlusion, two threads",
     )
 
 

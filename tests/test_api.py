@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -284,7 +285,7 @@ def some_depth(shape: tuple[int, int] = (48, 64)) -> Array:
 
 def test_map_is_the_equation_of_the_paper() -> None:
     rig, depth = some_rig(), some_depth()
-    found = Registrar(rig).map(depth)
+    found = Registrar(rig, occlusion=False).map(depth)
     assert found.shape == (48, 64, 2) and found.dtype == np.float32
     expected = mapped(rig, depth)
     inside = (expected > 1e-3).all(-1) & (expected < (55 - 1e-3, 41 - 1e-3)).all(-1)
@@ -304,9 +305,10 @@ def test_register_keeps_type_and_channels(
     rng = np.random.default_rng(2)
     source = rng.uniform(0, 200, (42, 56, *channels)).astype(dtype)
     image, mask = Registrar(rig).register(source, depth)
+    assert (mask == 2).any()  # of depths drawn at random
     assert image.dtype == dtype and image.shape == (48, 64, *channels)
     assert mask.dtype == np.uint8 and mask.shape == (48, 64)
-    assert (mask[5, 5:9] == 3).all() and set(np.unique(mask)) == {0, 1, 3}
+    assert (mask[5, 5:9] == 3).all() and set(np.unique(mask)) == {0, 1, 2, 3}
     places = Registrar(rig).map(depth)
     np.testing.assert_array_equal(mask == 0, np.isfinite(places).all(-1))
     assert not image[mask != 0].any()
@@ -338,6 +340,76 @@ def test_inputs_need_not_be_contiguous_and_depth_may_be_float64() -> None:
         np.testing.assert_array_equal(other_image, image)
         np.testing.assert_array_equal(other_mask, mask)
     np.testing.assert_array_equal(registrar.map(depth.astype(np.float64)), registrar.map(depth))
+
+
+def test_results_may_go_to_arrays_of_the_caller() -> None:
+    registrar, depth = Registrar(some_rig()), some_depth()
+    source = np.random.default_rng(6).integers(0, 256, (42, 56, 3), np.uint8)
+    image, mask = registrar.register(source, depth)
+    out, codes = np.full_like(image, 77), np.full_like(mask, 77)
+    found = registrar.register(source, depth, out=out, mask=codes)
+    assert found[0] is out and found[1] is codes
+    np.testing.assert_array_equal(out, image)
+    np.testing.assert_array_equal(codes, mask)
+    with pytest.raises(
+        ValueError, match=r"out has shape \(48, 64\) uint8, expected shape \(48, 64, 3"
+    ):
+        registrar.register(source, depth, out=codes)
+    with pytest.raises(ValueError, match=r"mask has shape \(48, 64\) float32, expected .* uint8"):
+        registrar.register(source, depth, mask=depth)
+    with pytest.raises(ValueError, match=r"out has .*contiguous and writeable"):
+        registrar.register(source, depth, out=np.empty((48, 64, 6), np.uint8)[..., ::2])
+    out.flags.writeable = False
+    with pytest.raises(ValueError, match=r"out has .*contiguous and writeable"):
+        registrar.register(source, depth, out=out)
+    with pytest.raises(ValueError, match="mask is not a numpy array"):
+        registrar.register(source, depth, mask=[0])
+
+
+def test_integer_depth_needs_its_unit() -> None:
+    rig = some_rig()
+    units = np.random.default_rng(7).integers(0, 5000, (48, 64), np.uint16)
+    metres = units.astype(np.float32) / 256
+    source = np.random.default_rng(8).random((42, 56), np.float32)
+    image, mask = Registrar(rig).register(source, metres)
+    for depth in (units, metres):  # metres stay metres
+        other_image, other_mask = Registrar(rig, depth_scale=1 / 256).register(source, depth)
+        np.testing.assert_array_equal(other_image, image)
+        np.testing.assert_array_equal(other_mask, mask)
+    with pytest.raises(ValueError, match=r"depth has shape .* uint16, expected .* metres"):
+        Registrar(rig).register(source, units)
+    with pytest.raises(ValueError, match=r"depth has shape .* int32, expected .* metres"):
+        Registrar(rig, depth_scale=0.01).register(source, units.astype(np.int32))
+    for scale in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="depth_scale is"):
+            Registrar(rig, depth_scale=scale)
+    small = units[::2, ::2].copy()
+    np.testing.assert_allclose(
+        Registrar(rig, depth_scale=1 / 256).map(small),
+        Registrar(rig).map(small.astype(np.float32) / 256),
+        atol=1e-4,
+    )
+
+
+@pytest.mark.parametrize("t", [(-0.15, 0.01, 0.02), (0.01, 0.15, -0.02)], ids=["right", "above"])
+def test_occlusion_is_what_the_rays_of_a_rendered_street_say(t: tuple[float, ...]) -> None:
+    """A street has many hidden strips thinner than a pixel of its depth map, of which that cannot
+    tell. Where it can, a pixel's neighbours are hidden as well."""
+    cameras = Pinhole.from_hfov(1280, 960, 50), Pinhole.from_hfov(640, 512, 48)
+    street = synthetic.Street(Rig(*cameras, t=t), 3, seed=0)
+    _, depth = street.render_view(1, "visible", "reference")
+    depth = depth.astype(np.float32)
+    source = np.ones((512, 640), np.uint8)
+    _, mask = Registrar(street.rig).register(source, depth)
+    _, seen = Registrar(street.rig, occlusion=False).register(source, depth)
+    np.testing.assert_array_equal(mask[mask != 2], seen[mask != 2])
+    known = seen == 0
+    hidden = street.occluded(1) & known
+    clear = cv2.erode(hidden.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    assert clear.sum() > 1000
+    assert (mask[clear] == 2).mean() > 0.97
+    assert (mask[hidden] == 2).mean() > 0.8
+    assert (mask[known & ~hidden] == 2).mean() < 0.005
 
 
 def test_the_number_of_threads_has_no_say() -> None:

@@ -64,15 +64,34 @@ Held image_of(const std::string& name, const py::object& object) {
     return held;
 }
 
-// Depth in metres: float32; float64 is converted. Integers are refused, they carry no unit.
-Held depth_of(const std::string& name, const py::object& object) {
+// Depth in metres: float32; float64 is converted. Integers are refused, they carry no unit, unless
+// the unit of uint16 is known.
+Held depth_of(const std::string& name, const py::object& object, bool unit_known = false) {
     py::array given = py::array::ensure(object);
     if (!given) throw py::value_error(name + " is not a numpy array");
     if (py::isinstance<py::array_t<double>>(given)) given = py::array_t<float>::ensure(given);
-    if (!py::isinstance<py::array_t<float>>(given) || given.ndim() != 2 || given.size() == 0)
+    const bool is_depth = py::isinstance<py::array_t<float>>(given) ||
+                          (unit_known && py::isinstance<py::array_t<std::uint16_t>>(given));
+    if (!is_depth || given.ndim() != 2 || given.size() == 0)
         throw py::value_error(name + " has " + shape_text(given) +
                               ", expected shape (h, w) float32 in metres");
     return image_of(name, given);
+}
+
+// The caller's array to write to, or a new one.
+py::array result_of(const char* name, const py::object& object, const py::dtype& dtype,
+                    const std::vector<py::ssize_t>& shape) {
+    if (object.is_none()) return py::array(dtype, shape);
+    if (!py::isinstance<py::array>(object))
+        throw py::value_error(std::string(name) + " is not a numpy array");
+    const auto given = py::reinterpret_borrow<py::array>(object);
+    const bool fits =
+        std::equal(shape.begin(), shape.end(), given.shape(), given.shape() + given.ndim()) &&
+        given.dtype().equal(dtype);
+    if (!fits || !given.writeable() || !(given.flags() & py::array::c_style))
+        throw py::value_error(std::string(name) + " has " + shape_text(given) + ", expected " +
+                              shape_text(py::array(dtype, shape)) + ", contiguous and writeable");
+    return given;
 }
 
 struct HeldList {
@@ -534,7 +553,10 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
            const py::object& progress, const py::object& flow) {
             const HeldList r = list_of("reference", references, image_of);
             const HeldList s = list_of("source", sources, image_of);
-            const HeldList d = list_of("depth", depths, depth_of);
+            const HeldList d =
+                list_of("depth", depths, [](const std::string& name, const py::object& depth) {
+                    return depth_of(name, depth);
+                });
             const Progress tell = [&progress](const std::string& stage, double share) {
                 const py::gil_scoped_acquire gil;
                 if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
@@ -572,16 +594,25 @@ see CalibrationResult.converged.)");
     py::class_<Registrar>(m, "Registrar", R"(One rig, a stream of frames, Eq. (warping).
 
 num_threads: 0 uses every core. nearest: register() takes the source pixel next to the point as it
-is, instead of interpolating between four, so that radiometric counts are never mixed. Raises
-ValueError where the rig is not valid.)")
-        .def(py::init<const Rig&, int, bool>(), py::arg("rig"), py::arg("num_threads") = 0,
-             py::arg("nearest") = false)
+is, instead of interpolating between four, so that radiometric counts are never mixed. occlusion:
+mask what the source camera sees something nearer in front of; without it, a near object's edge
+appears twice. depth_scale: metres per unit of uint16 depth (1 / 256 is KITTI's), 0 unknown; None
+refuses integers. Raises ValueError where the rig or an option is not valid.)")
+        .def(py::init([](const Rig& rig, int num_threads, bool nearest, bool occlusion,
+                         const std::optional<double>& depth_scale) {
+                 if (depth_scale && !(std::isfinite(*depth_scale) && *depth_scale > 0))
+                     throw py::value_error("depth_scale is " + std::to_string(*depth_scale) +
+                                           ", expected metres per unit, > 0, or None");
+                 return Registrar(rig, {num_threads, nearest, occlusion, depth_scale.value_or(0)});
+             }),
+             py::arg("rig"), py::arg("num_threads") = 0, py::arg("nearest") = false,
+             py::arg("occlusion") = true, py::arg("depth_scale") = py::none())
         .def_property_readonly("rig", &Registrar::rig, "A copy of the rig.",
                                py::return_value_policy::copy)
         .def(
             "map",
             [](const Registrar& registrar, const py::object& depth) {
-                const Held d = depth_of("depth", depth);
+                const Held d = depth_of("depth", depth, registrar.options().depth_scale > 0);
                 const Pinhole& grid = registrar.rig().reference;
                 py::array_t<float> out({grid.height, grid.width, 2});
                 float* data = out.mutable_data();
@@ -593,38 +624,41 @@ ValueError where the rig is not valid.)")
             },
             py::arg("depth"),
             "(H, W, 2) float32: x and y in the source image [px] of each reference pixel, NaN "
-            "where "
-            "it has none. depth: (h, w) float32 [m] of the reference's aspect.")
+            "where it is not valid. depth: as in register().")
         .def(
             "register",
-            [](const Registrar& registrar, const py::object& source, const py::object& depth) {
+            [](const Registrar& registrar, const py::object& source, const py::object& depth,
+               const py::object& out, const py::object& mask) {
                 const Held s = image_of("source", source);
-                const Held d = depth_of("depth", depth);
+                const Held d = depth_of("depth", depth, registrar.options().depth_scale > 0);
                 const Pinhole& grid = registrar.rig().reference;
                 std::vector<py::ssize_t> shape{grid.height, grid.width};
+                py::array codes = result_of("mask", mask, py::dtype::of<std::uint8_t>(), shape);
                 if (s.array.ndim() == 3) shape.push_back(s.array.shape(2));
-                py::array image(s.array.dtype(), shape);
-                py::array_t<std::uint8_t> mask({grid.height, grid.width});
-                const MutableImageView out{
+                py::array image = result_of("out", out, s.array.dtype(), shape);
+                const MutableImageView pixels{
                     image.mutable_data(),
                     grid.width,
                     grid.height,
                     s.view.channels,
                     s.view.type,
                     static_cast<std::ptrdiff_t>(grid.width * s.view.channels * image.itemsize())};
-                std::uint8_t* codes = mask.mutable_data();
+                auto* written = static_cast<std::uint8_t*>(codes.mutable_data());
                 {
                     const py::gil_scoped_release unlocked;
-                    registrar.register_frame(s.view, d.view, out, codes);
+                    registrar.register_frame(s.view, d.view, pixels, written);
                 }
-                return py::make_tuple(image, mask);
+                return py::make_tuple(image, codes);
             },
-            py::arg("source"), py::arg("depth"),
+            py::arg("source"), py::arg("depth"), py::arg("out") = py::none(),
+            py::arg("mask") = py::none(),
             R"(The source on the reference grid, and what each pixel is worth.
 
 source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth: (h, w) float32
-[m] of the reference's aspect. Returns (image, mask): image (H, W[, 3]) in the source's dtype, 0
-where not valid; mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
+[m], or uint16 if depth_scale was given, of the reference's aspect. out, mask: contiguous arrays to
+write the results to, which must not overlap the others; else new ones are made, which for large
+images takes as long as filling them. Returns (image, mask): image (H, W[, 3]) in the source's
+dtype, 0 where not valid; mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
 Raises ValueError with shapes and dtypes.)");
 
     m.def(

@@ -33,8 +33,6 @@ namespace xcalib {
         const float su = (d * (ax * fx + bx) + kx) * inverse;
         const float sv = (d * (ay * fx + by) + ky) * inverse;
         const bool has_depth = (d > 0.0f) & (d <= kMaxDepth);  // false for NaN and inf
-        // A pixel on the rim stays there whatever the last bit of a rounding says.
-        constexpr float kRim = 1e-3f;
         const bool inside = (z > static_cast<float>(kNearestZ)) & (su >= -kRim) &
                             (su <= right + kRim) & (sv >= -kRim) & (sv <= bottom + kRim);
         const bool ok = has_depth & inside;

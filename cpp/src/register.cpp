@@ -2,73 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
 
 #include "parallel.hpp"
+#include "register_rows.hpp"
+#include "workers.hpp"
 
 namespace xcalib {
 namespace {
 
-template <class T>
-T rounded(float value) {
-    if constexpr (std::is_floating_point_v<T>) return value;
-    else return static_cast<T>(value + 0.5f);  // a mean of values in range is in range
-}
-
-// One row of type T, zero where not valid: the bilinear mean, or the pixel whose centre is next, as
-// it is, so that counts of a radiometric source are never mixed.
-template <class T, int kChannels, bool kNearest>
-void sample_row(const ImageView& source, const float* u, const float* v,
-                const std::uint8_t* validity, int width, void* row) {
-    T* out = static_cast<T*>(row);
-    for (int x = 0; x < width; ++x, out += kChannels) {
-        if (validity[x] != static_cast<std::uint8_t>(Validity::valid)) {
-            for (int c = 0; c < kChannels; ++c) out[c] = T{0};
-            continue;
-        }
-        if constexpr (kNearest) {
-            const T* pixel = source.row<T>(static_cast<int>(v[x] + 0.5f)) +
-                             kChannels * static_cast<int>(u[x] + 0.5f);
-            for (int c = 0; c < kChannels; ++c) out[c] = pixel[c];
-            continue;
-        }
-        // The last cell serves its far edge too, so that all four pixels exist.
-        const int x0 = std::min(static_cast<int>(u[x]), source.width - 2);
-        const int y0 = std::min(static_cast<int>(v[x]), source.height - 2);
-        const float a = u[x] - static_cast<float>(x0), b = v[x] - static_cast<float>(y0);
-        const T* top = source.row<T>(y0) + kChannels * x0;
-        const T* bottom = source.row<T>(y0 + 1) + kChannels * x0;
-        for (int c = 0; c < kChannels; ++c) {
-            const float upper =
-                static_cast<float>(top[c]) +
-                a * (static_cast<float>(top[c + kChannels]) - static_cast<float>(top[c]));
-            const float lower =
-                static_cast<float>(bottom[c]) +
-                a * (static_cast<float>(bottom[c + kChannels]) - static_cast<float>(bottom[c]));
-            out[c] = rounded<T>(upper + b * (lower - upper));
-        }
-    }
-}
-
-using RowSampler = void (*)(const ImageView&, const float*, const float*, const std::uint8_t*, int,
-                            void*);
-
-template <class T>
-RowSampler row_sampler(int channels, bool nearest) {
-    if (channels == 3) return nearest ? sample_row<T, 3, true> : sample_row<T, 3, false>;
-    return nearest ? sample_row<T, 1, true> : sample_row<T, 1, false>;
-}
-
-RowSampler row_sampler(PixelType type, int channels, bool nearest) {
-    switch (type) {
-        case PixelType::u8: return row_sampler<std::uint8_t>(channels, nearest);
-        case PixelType::u16: return row_sampler<std::uint16_t>(channels, nearest);
-        case PixelType::f32: return row_sampler<float>(channels, nearest);
-    }
-    throw std::invalid_argument("unknown pixel type");
-}
+// Of the cells, one part a thread: each costs memory, and to join them costs time.
+constexpr int kMostParts = 8;
+// Rows that a thread takes at a time, so that one that is held up keeps no other waiting.
+constexpr int kRows = 32;
 
 void require_size(const char* name, int width, int height, const Pinhole& camera) {
     if (width == camera.width && height == camera.height) return;
@@ -78,43 +27,134 @@ void require_size(const char* name, int width, int height, const Pinhole& camera
     throw std::invalid_argument(message.str());
 }
 
+Image in_metres(const DepthView& depth) {
+    if (depth.view.type == PixelType::f32) return clean_depth(depth.view);
+    Image out(depth.view.width, depth.view.height);
+    for (int y = 0; y < out.height; ++y) {
+        const std::uint16_t* units = depth.view.row<std::uint16_t>(y);
+        for (int x = 0; x < out.width; ++x) out.row(y)[x] = depth.scale * units[x];
+    }
+    return out;
+}
+
 }  // namespace
 
-Registrar::Registrar(const Rig& rig, int num_threads, bool nearest)
-    : rig_((rig.validate(), rig)), reprojection_(rig), num_threads_(num_threads),
-      nearest_(nearest) {
+void RegistrarOptions::validate() const {
+    std::ostringstream message;
     if (num_threads < 0)
-        throw std::invalid_argument("num_threads is " + std::to_string(num_threads) +
-                                    ", expected 0 (every core) or more");
-    if (rig.source.width < 2 || rig.source.height < 2)
-        throw std::invalid_argument("source is narrower than 2 px, too small to interpolate");
+        message << "num_threads is " << num_threads << ", expected 0 (every core) or more";
+    else if (!(depth_scale >= 0) || !std::isfinite(depth_scale))
+        message << "depth_scale is " << depth_scale
+                << ", expected metres per unit of uint16 depth, or 0 to refuse it";
+    else return;
+    throw std::invalid_argument(message.str());
 }
 
-ImageView Registrar::on_reference_grid(const ImageView& depth, Image& room) const {
-    const Pinhole& grid = rig_.reference;
-    require_same_aspect("depth", depth.width, depth.height, grid.width, grid.height);
-    if (depth.type != PixelType::f32 || depth.channels != 1)
-        throw std::invalid_argument("depth must be one float32 channel in metres");
-    if (depth.width == grid.width && depth.height == grid.height) return depth;
-    room = resize_depth(clean_depth(depth), grid.width, grid.height);
-    return room.view();
+struct Registrar::Stream {
+    // The cells of the parts one after the other, then those of all.
+    using Cells = std::vector<Nearness>;
+
+    CellGrid grid;
+    int parts;
+    bool occlusion;
+    Workers workers;
+    std::mutex mutex;
+    std::vector<std::unique_ptr<Cells>> spare;  // one for each call that there was at a time
+
+    Stream(const Rig& rig, const RegistrarOptions& options)
+        : grid(rig), parts(std::min(resolve_threads(options.num_threads), kMostParts)),
+          // Cameras at one place see the same.
+          occlusion(options.occlusion && rig.t().norm() > 0),
+          workers(resolve_threads(options.num_threads)) {}
+
+    std::unique_ptr<Cells> take() {
+        {
+            const std::lock_guard lock(mutex);
+            if (!spare.empty()) {
+                std::unique_ptr<Cells> cells = std::move(spare.back());
+                spare.pop_back();
+                return cells;
+            }
+        }
+        return std::make_unique<Cells>((parts + 1) * cells_with_room(grid));
+    }
+
+    void give_back(std::unique_ptr<Cells> cells) {
+        const std::lock_guard lock(mutex);
+        spare.push_back(std::move(cells));
+    }
+
+    // Splats all of the depth, then calls work(cells, begin, end) on all rows of the reference.
+    template <class Work>
+    void each_row(const Reprojection& reprojection, const DepthView& depth, const Work& work) {
+        std::unique_ptr<Cells> cells;
+        const Nearness* joined = nullptr;
+        const int height = depth.view.height;
+        const auto share = [](int of, int part, int count) {
+            return static_cast<int>(static_cast<long>(of) * part / count);
+        };
+        if (occlusion) {
+            cells = take();
+            const std::size_t size = cells_with_room(grid);
+            workers.each(parts, [&](int part) {
+                Nearness* own = cells->data() + part * size;
+                std::fill_n(own, size, Nearness{0});
+                splat_rows(reprojection, depth, grid, share(height, part, parts),
+                           share(height, part + 1, parts), own);
+            });
+            Nearness* out = cells->data() + parts * size;
+            workers.each(parts, [&](int part) {
+                join_cells(grid, cells->data(), parts, share(grid.height, part, parts),
+                           share(grid.height, part + 1, parts), out);
+            });
+            joined = out;
+        }
+        workers.each((height + kRows - 1) / kRows, [&](int part) {
+            work(joined, part * kRows, std::min(height, (part + 1) * kRows));
+        });
+        if (cells) give_back(std::move(cells));
+    }
+};
+
+Registrar::Registrar(const Rig& rig, const RegistrarOptions& options)
+    : rig_((rig.validate(), rig)), options_((options.validate(), options)), reprojection_(rig) {
+    if (rig.source.width < 2 || rig.source.height < 2)
+        throw std::invalid_argument("source is narrower than 2 px, too small to interpolate");
+    stream_ = std::make_unique<Stream>(rig, options);
 }
+
+Registrar::~Registrar() = default;
+Registrar::Registrar(Registrar&&) noexcept = default;
+Registrar& Registrar::operator=(Registrar&&) noexcept = default;
+
+namespace {
+
+// The depth on the reference's grid: as given where it has that size, else resized into `room`.
+DepthView on_grid(const ImageView& depth, double scale, const Pinhole& grid, Image& room) {
+    require_same_aspect("depth", depth.width, depth.height, grid.width, grid.height);
+    const bool metres = depth.type == PixelType::f32;
+    const bool units = depth.type == PixelType::u16 && scale > 0;
+    if (depth.channels != 1 || !(metres || units))
+        throw std::invalid_argument(
+            "depth must be one float32 channel in metres, or uint16 with depth_scale given");
+    const DepthView given{depth, metres ? 1.0f : static_cast<float>(scale)};
+    if (depth.width == grid.width && depth.height == grid.height) return given;
+    room = resize_depth(in_metres(given), grid.width, grid.height);
+    return {room.view(), 1.0f};
+}
+
+}  // namespace
 
 void Registrar::map(const ImageView& depth, float* out) const {
     Image room;
-    const ImageView grid = on_reference_grid(depth, room);
-    parallel_ranges(grid.height, num_threads_, [&](int begin, int end) {
-        std::vector<float> u(grid.width), v(grid.width);
-        std::vector<std::uint8_t> validity(grid.width);
-        for (int y = begin; y < end; ++y) {
-            map_row(reprojection_, grid.row<float>(y), y, grid.width, u.data(), v.data(),
-                    validity.data());
-            float* row = out + 2 * static_cast<std::size_t>(y) * grid.width;
-            for (int x = 0; x < grid.width; ++x) {
-                row[2 * x] = u[x];
-                row[2 * x + 1] = v[x];
-            }
-        }
+    RowsTask task{};
+    task.reprojection = &reprojection_;
+    task.depth = on_grid(depth, options_.depth_scale, rig_.reference, room);
+    task.grid = &stream_->grid;
+    stream_->each_row(reprojection_, task.depth, [&](const Nearness* cells, int begin, int end) {
+        RowsTask part = task;
+        part.cells = cells;
+        map_rows(part, begin, end, out);
     });
 }
 
@@ -124,17 +164,21 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
     require_size("registered", registered.width, registered.height, rig_.reference);
     if (registered.type != source.type || registered.channels != source.channels)
         throw std::invalid_argument("registered must have the source's pixel type and channels");
+    if (std::abs(source.row_bytes) > std::numeric_limits<std::int32_t>::max() / source.height)
+        throw std::invalid_argument("source takes more than 2 GiB, expected less");
     Image room;
-    const ImageView grid = on_reference_grid(depth, room);
-    const RowSampler sample = row_sampler(source.type, source.channels, nearest_);
-    parallel_ranges(grid.height, num_threads_, [&](int begin, int end) {
-        std::vector<float> u(grid.width), v(grid.width);
-        for (int y = begin; y < end; ++y) {
-            std::uint8_t* validity = mask + static_cast<std::size_t>(y) * grid.width;
-            map_row(reprojection_, grid.row<float>(y), y, grid.width, u.data(), v.data(), validity);
-            sample(source, u.data(), v.data(), validity, grid.width,
-                   static_cast<char*>(registered.data) + y * registered.row_bytes);
-        }
+    RowsTask task{};
+    task.reprojection = &reprojection_;
+    task.depth = on_grid(depth, options_.depth_scale, rig_.reference, room);
+    task.grid = &stream_->grid;
+    task.source = source;
+    task.nearest = options_.nearest;
+    task.registered = registered;
+    task.mask = mask;
+    stream_->each_row(reprojection_, task.depth, [&](const Nearness* cells, int begin, int end) {
+        RowsTask part = task;
+        part.cells = cells;
+        register_rows(part, begin, end);
     });
 }
 

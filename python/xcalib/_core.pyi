@@ -352,25 +352,42 @@ class Registrar:
 
     num_threads: 0 uses every core. nearest: register() takes the source pixel next to the
     point as it is, instead of interpolating between four, so that radiometric counts are
-    never mixed. Raises ValueError where the rig is not valid.
+    never mixed. occlusion: mask what the source camera sees something nearer in front of;
+    without it, a near object's edge appears twice. depth_scale: metres per unit of uint16
+    depth (1 / 256 is KITTI's), 0 unknown; None refuses integers. Raises ValueError where the
+    rig or an option is not valid.
     """
-    def __init__(self, rig: Rig, num_threads: int = 0, nearest: bool = False) -> None: ...
+    def __init__(
+        self,
+        rig: Rig,
+        num_threads: int = 0,
+        nearest: bool = False,
+        occlusion: bool = True,
+        depth_scale: float | None = None,
+    ) -> None: ...
     @property
     def rig(self) -> Rig:
         """A copy of the rig."""
     def map(self, depth: NDArray[Any]) -> NDArray[float32]:
         """(H, W, 2) float32: x and y in the source image [px] of each reference pixel, NaN where
-        it has none. depth: (h, w) float32 [m] of the reference's aspect.
+        it is not valid. depth: as in register().
         """
     def register(
-        self, source: NDArray[Any], depth: NDArray[Any]
+        self,
+        source: NDArray[Any],
+        depth: NDArray[Any],
+        out: NDArray[Any] | None = None,
+        mask: NDArray[uint8] | None = None,
     ) -> tuple[NDArray[Any], NDArray[uint8]]:
         """The source on the reference grid, and what each pixel is worth.
 
         source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth:
-        (h, w) float32 [m] of the reference's aspect. Returns (image, mask): image (H, W[, 3])
-        in the source's dtype, 0 where not valid; mask (H, W) uint8: 0 valid, 1 outside the
-        source, 2 occluded, 3 no depth. Raises ValueError with shapes and dtypes.
+        (h, w) float32 [m], or uint16 if depth_scale was given, of the reference's aspect.
+        out, mask: contiguous arrays to write the results to, which must not overlap the
+        others; else new ones are made, which for large images takes as long as filling them.
+        Returns (image, mask): image (H, W[, 3]) in the source's dtype, 0 where not valid;
+        mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth. Raises
+        ValueError with shapes and dtypes.
         """
 
 def nec(

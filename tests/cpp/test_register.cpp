@@ -55,6 +55,10 @@ Pixels<T> random_pixels(std::mt19937& random, int width, int height, int channel
     return pixels;
 }
 
+// Threads; the random depths of these tests hide most of each other.
+RegistrarOptions by(int num_threads) { return {num_threads, false, false, 0}; }
+RegistrarOptions nearest_by(int num_threads) { return {num_threads, true, false, 0}; }
+
 constexpr int kWidth = 60, kHeight = 44, kSourceWidth = 50, kSourceHeight = 40;
 
 Rig small_rig(unsigned seed) {
@@ -87,7 +91,8 @@ void expect_registered_as_by_the_book(int channels) {
     Pixels<T> out(kWidth, kHeight, channels, /*padding=*/3);
     std::fill(out.values.begin(), out.values.end(), T(77));
     std::vector<std::uint8_t> mask(kWidth * kHeight, 9);
-    Registrar(rig, 2).register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
+    Registrar(rig, by(2))
+        .register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
     int valid = 0, outside = 0;
     for (int y = 0; y < kHeight; ++y) {
         for (int x = 0; x < kWidth; ++x) {
@@ -184,11 +189,11 @@ void expect_nearest_pixels_as_they_are(int channels) {
         random_pixels<T>(random, kSourceWidth, kSourceHeight, channels, /*padding=*/5);
     Pixels<T> out(kWidth, kHeight, channels, /*padding=*/3);
     std::vector<std::uint8_t> mask(kWidth * kHeight, 9), expected_mask(mask);
-    Registrar(rig, 2, /*nearest=*/true)
+    Registrar(rig, nearest_by(2))
         .register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
     Pixels<T> blended(kWidth, kHeight, channels);
-    Registrar(rig, 2).register_frame(source.view(), depth.view(), blended.mutable_view(),
-                                     expected_mask.data());
+    Registrar(rig, by(2))
+        .register_frame(source.view(), depth.view(), blended.mutable_view(), expected_mask.data());
     EXPECT_EQ(mask, expected_mask);
     int valid = 0;
     for (int y = 0; y < kHeight; ++y)
@@ -224,7 +229,7 @@ TEST(Registrar, NearestReachesTheLastPixel) {
     Pixels<std::uint16_t> source(4, 3, 1), out(4, 3, 1);
     for (int i = 0; i < 12; ++i) source.values[i] = static_cast<std::uint16_t>(1000 + i);
     std::vector<std::uint8_t> mask(12);
-    const Registrar registrar(shifted_rig(4, 3, -0.25, -0.25), 1, /*nearest=*/true);
+    const Registrar registrar(shifted_rig(4, 3, -0.25, -0.25), nearest_by(1));
     registrar.register_frame(source.view(), Image(4, 3, 1.0f).view(), out.mutable_view(),
                              mask.data());
     EXPECT_EQ(out.at(3, 2, 0), 1011);
@@ -267,7 +272,7 @@ TEST(Registrar, MapIsWhereTheRigSendsEachPixel) {
     const Rig rig = small_rig(5);
     const Image depth = some_depth(6);
     std::vector<float> map(2 * kWidth * kHeight, -7.0f);
-    Registrar(rig, 2).map(depth.view(), map.data());
+    Registrar(rig, by(2)).map(depth.view(), map.data());
     int valid = 0;
     for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x) {
@@ -291,7 +296,7 @@ TEST(Registrar, DepthMayHaveAnotherSize) {
                              kWidth / 2, kHeight / 2);
     const Image twice = drawn([&](double x, double y) { return plane(x / 2 - 0.25, y / 2 - 0.25); },
                               2 * kWidth, 2 * kHeight);
-    const Registrar registrar(rig);
+    const Registrar registrar(rig, by(0));
     std::vector<float> expected(2 * kWidth * kHeight), found(expected.size());
     registrar.map(full.view(), expected.data());
     for (const Image& depth : {half, twice}) {
@@ -317,7 +322,7 @@ TEST(Registrar, TheNumberOfThreadsHasNoSay) {
     std::vector<std::vector<float>> images, maps;
     std::vector<std::vector<std::uint8_t>> masks;
     for (const int threads : {1, 2, 3, 0}) {
-        const Registrar registrar(rig, threads);
+        const Registrar registrar(rig, by(threads));
         Pixels<float> out(kWidth, kHeight, 3);
         std::vector<std::uint8_t> mask(kWidth * kHeight);
         std::vector<float> map(2 * kWidth * kHeight);
@@ -364,7 +369,7 @@ TEST(Registrar, ARigThatIsNotValidIsRefused) {
     Rig rig = small_rig(12);
     rig.source.fx = 0;
     EXPECT_TRUE(has(refusal([&] { Registrar{rig}; }), "source: fx = 0"));
-    EXPECT_TRUE(has(refusal([] { Registrar(small_rig(12), -1); }), "num_threads is -1"));
+    EXPECT_TRUE(has(refusal([] { Registrar(small_rig(12), by(-1)); }), "num_threads is -1"));
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <memory>
 
 #include "xcalib/camera.hpp"
 #include "xcalib/image.hpp"
@@ -10,32 +10,49 @@
 
 namespace xcalib {
 
+struct RegistrarOptions {
+    int num_threads = 0;    // 0 uses every core
+    bool nearest = false;   // take the pixel next to the point as it is, not a mean of four
+    bool occlusion = true;  // mask what the source camera sees something nearer in front of
+    // Metres per unit of uint16 depth; 1.0 / 256 is KITTI's. 0: refuse integers, which carry no
+    // unit of their own.
+    double depth_scale = 0;
+
+    // Throws std::invalid_argument naming the field, its value and the allowed range.
+    void validate() const;
+};
+
 class Registrar {
    public:
-    // num_threads: 0 uses every core. nearest: take the pixel next to the point as it is, instead
-    // of interpolating between four. Throws std::invalid_argument where the rig is not valid.
-    explicit Registrar(const Rig& rig, int num_threads = 0, bool nearest = false);
+    // Throws std::invalid_argument where the rig or an option is not valid.
+    explicit Registrar(const Rig& rig, const RegistrarOptions& options = {});
+    ~Registrar();
+    Registrar(Registrar&&) noexcept;
+    Registrar& operator=(Registrar&&) noexcept;
 
     const Rig& rig() const { return rig_; }
+    const RegistrarOptions& options() const { return options_; }
 
     // Source coordinates of each reference pixel, (height x width x 2) floats [px], x then y; NaN
-    // where there is none. `depth`: one float32 channel [m], any size of the reference's aspect.
+    // where there is none. `depth`: one channel, float32 [m] or uint16 (see depth_scale), 0
+    // unknown, any size of the reference's aspect.
     void map(const ImageView& depth, float* out) const;
 
     // Samples `source` on the reference grid. `registered` has the source's type and channels and
     // the reference's size; `mask` takes width * height Validity codes. Pixels that are not valid
-    // are 0. Throws std::invalid_argument where a size or type does not fit.
+    // are 0. Once the first frame is through, nothing is allocated as long as the depth has the
+    // reference's size. Several threads may call it at once.
+    // Throws std::invalid_argument where a size or type does not fit.
     void register_frame(const ImageView& source, const ImageView& depth,
                         const MutableImageView& registered, std::uint8_t* mask) const;
 
    private:
-    // The depth on the reference's grid: as given where it has that size, else resized into `room`.
-    ImageView on_reference_grid(const ImageView& depth, Image& room) const;
+    struct Stream;  // what is kept between frames: threads and buffers
 
     Rig rig_;
+    RegistrarOptions options_;
     Reprojection reprojection_;
-    int num_threads_;
-    bool nearest_;
+    std::unique_ptr<Stream> stream_;
 };
 
 }  // namespace xcalib

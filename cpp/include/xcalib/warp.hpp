@@ -27,6 +27,10 @@ struct Reprojection {
 // A point nearer to the source camera's plane than this has no stable projection. [m]
 inline constexpr double kNearestZ = 1e-3;
 
+// So far beyond the outermost pixel centres a point still counts as on them: a pixel on the rim
+// stays there whatever the last bit of a rounding says. [px]
+inline constexpr float kRim = 1e-3f;
+
 // One row: source coordinates [px] of the reference pixels (0..width-1, y), and their validity.
 // Coordinates of pixels that are not valid are NaN.
 void map_row(const Reprojection& reprojection, const float* depth, int y, int width, float* u,

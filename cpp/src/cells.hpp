@@ -1,0 +1,34 @@
+// Occlusion: the nearest surface that the source camera has in each cell of its image.
+#pragma once
+
+#include <cstdint>
+
+#include "xcalib/camera.hpp"
+
+namespace xcalib {
+
+// Of 1/z [1/m], the upper half of a float: rounded down to 1 in 128, so that no point hides itself.
+// 0 where nothing is.
+using Nearness = std::uint16_t;
+
+// Cells as far apart as reference pixels are in the source: smaller ones would let a far surface
+// look through a near one, larger ones would widen what is near.
+struct CellGrid {
+    int width = 0, height = 0;
+    float per_pixel_x = 1, per_pixel_y = 1;
+    // Hidden is what has a 1/z below that of its cell by more than
+    // relative_tolerance / z + absolute_tolerance [1/m].
+    float relative_tolerance = 0, absolute_tolerance = 0;
+
+    CellGrid() = default;
+    explicit CellGrid(const Rig& rig);
+    int count() const { return width * height; }
+};
+
+// A buffer's length: behind the cells stands one for points that fall in none, and one more that
+// may be read together with it.
+inline std::size_t cells_with_room(const CellGrid& grid) {
+    return static_cast<std::size_t>(grid.count()) + 2;
+}
+
+}  // namespace xcalib

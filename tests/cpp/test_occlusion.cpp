@@ -1,0 +1,188 @@
+// What the source camera cannot see, against rays cast through a scene of boards before a wall.
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+
+#include <cmath>
+#include <vector>
+
+#include "refusal.hpp"
+#include "scenes.hpp"
+#include "xcalib/register.hpp"
+
+namespace xcalib {
+namespace {
+
+using namespace ::xcalib::testing;  // NOLINT: scenes.hpp, refusal.hpp
+
+constexpr int kWidth = 640, kHeight = 480;
+constexpr std::uint8_t kOccluded = static_cast<std::uint8_t>(Validity::occluded);
+
+// Upright boards, within the reference's view, and a wall that is not square to it: planes
+// z = z0 + slope * x.
+struct Board {
+    double z0, slope, left, right, top, bottom;  // [m], in the reference camera's axes
+};
+const std::vector<Board> kScene{
+    {18, 0.3, -100, 100, -100, 100}, {4, 0.0, -1.2, -0.5, -0.6, 0.5},
+    {5, -0.2, 0.3, 1.4, -0.3, 1.2},  {7, 0.1, -2.2, -1.6, -1.6, 1.7},
+    {9, 0.0, 1.8, 2.6, -1.7, -0.3},  {3, 0.0, -0.1, 0.15, 0.4, 0.9},
+};
+
+// Depth at which the ray from `origin` along `ray` meets the board, in units of the ray; 0 if it
+// does not.
+double meets(const Board& b, const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {
+    const double s = (b.z0 + b.slope * origin.x() - origin.z()) / (ray.z() - b.slope * ray.x());
+    const Eigen::Vector3d p = origin + s * ray;
+    const bool on = p.x() >= b.left && p.x() <= b.right && p.y() >= b.top && p.y() <= b.bottom;
+    return s > 0 && on ? s : 0;
+}
+
+struct Rendered {
+    Image depth{kWidth, kHeight};
+    std::vector<bool> hidden;  // from the source camera
+};
+
+Rendered rendered(const Rig& rig) {
+    Rendered out;
+    const Eigen::Vector3d eye = -rig.R().transpose() * rig.t();
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+            const Eigen::Vector3d ray = unproject(rig.reference, x, y, 1);
+            double nearest = 1e9;
+            for (const Board& board : kScene) {
+                const double s = meets(board, Eigen::Vector3d::Zero(), ray);
+                if (s > 0) nearest = std::min(nearest, s);
+            }
+            out.depth.row(y)[x] = static_cast<float>(nearest);
+            bool hidden = false;
+            for (const Board& board : kScene) {
+                const double s = meets(board, eye, nearest * ray - eye);
+                hidden |= s > 0 && s < 1 - 1e-6;
+            }
+            out.hidden.push_back(hidden);
+        }
+    return out;
+}
+
+struct Registered {
+    std::vector<float> image = std::vector<float>(kWidth * kHeight);
+    std::vector<std::uint8_t> mask = std::vector<std::uint8_t>(kWidth * kHeight);
+};
+
+Registered registered(const Rig& rig, const Image& source, const Image& depth,
+                      const RegistrarOptions& options) {
+    Registered out;
+    Registrar(rig, options)
+        .register_frame(source.view(), depth.view(),
+                        {out.image.data(), kWidth, kHeight, 1, PixelType::f32, 4 * kWidth},
+                        out.mask.data());
+    return out;
+}
+
+Rig rig_at(const Eigen::Vector3d& source_position, int source_width, int source_height,
+           double hfov) {
+    Rig rig{Pinhole::from_hfov(kWidth, kHeight, 0.9),
+            Pinhole::from_hfov(source_width, source_height, hfov),
+            {}};
+    rig = turned(rig, {0.01, -0.02, 0.015});
+    rig.source_from_reference.translation = -rig.R() * source_position;
+    return rig;
+}
+
+TEST(Occlusion, IsWhatTheRaysSay) {
+    struct Case {
+        const char* name;
+        Eigen::Vector3d position;
+        int width, height;
+        double hfov;
+    };
+    for (const Case& c : {Case{"right", {0.3, 0.01, 0.02}, 320, 256, 0.85},
+                          Case{"left", {-0.3, 0, -0.03}, 640, 512, 0.9},
+                          Case{"above", {0.01, -0.3, 0}, 320, 256, 0.85},
+                          Case{"below, finer", {0, 0.25, 0.02}, 1280, 1024, 0.9},
+                          Case{"aslant", {-0.25, 0.25, 0.05}, 480, 384, 0.95},
+                          Case{"narrow", {0.3, 0.02, 0}, 640, 512, 0.45}}) {
+        const Rig rig = rig_at(c.position, c.width, c.height, c.hfov);
+        const Rendered scene = rendered(rig);
+        const Image source(c.width, c.height, 1.0f);
+        const Registered all = registered(rig, source, scene.depth, {1, false, false, 0});
+        const Registered found = registered(rig, source, scene.depth, {1, false, true, 0});
+        int hidden = 0, visible = 0, hits = 0, lost = 0;
+        for (int i = 0; i < kWidth * kHeight; ++i) {
+            if (all.mask[i] != 0) {
+                ASSERT_EQ(found.mask[i], all.mask[i]);
+                continue;
+            }
+            ASSERT_TRUE(found.mask[i] == 0 || found.mask[i] == kOccluded);
+            ASSERT_EQ(found.image[i], found.mask[i] == 0 ? 1.0f : 0.0f);
+            const bool gone = found.mask[i] == kOccluded;
+            (scene.hidden[i] ? hidden : visible)++;
+            hits += gone && scene.hidden[i];
+            lost += gone && !scene.hidden[i];
+        }
+        EXPECT_GT(hidden, visible / 100) << c.name;
+        EXPECT_GE(hits, 0.97 * hidden) << c.name << ": " << hits << " of " << hidden;
+        EXPECT_LE(lost, 0.005 * visible) << c.name << ": " << lost << " of " << visible;
+    }
+}
+
+TEST(Occlusion, NothingHidesOnOneSurface) {
+    for (const Eigen::Vector3d& position : {Eigen::Vector3d(0.3, 0, 0), Eigen::Vector3d(0, -0.3, 0),
+                                            Eigen::Vector3d(0.2, 0.2, 0.3)}) {
+        const Rig rig = rig_at(position, 320, 256, 0.9);
+        // A road up to the horizon: depth grows by far more than any tolerance from row to row.
+        Image road(kWidth, kHeight);
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < kWidth; ++x)
+                road.row(y)[x] = y > 250 ? static_cast<float>(1.5 * 600 / (y - 249)) : 0.0f;
+        const Registered out = registered(rig, Image(320, 256, 1.0f), road, {1, false, true, 0});
+        EXPECT_EQ(std::count(out.mask.begin(), out.mask.end(), kOccluded), 0) << position;
+    }
+}
+
+TEST(Occlusion, CamerasAtOnePlaceSeeTheSame) {
+    const Rig rig = rig_at({0, 0, 0}, 320, 256, 0.9);
+    const Registered out =
+        registered(rig, Image(320, 256, 1.0f), rendered(rig).depth, {1, false, true, 0});
+    for (const std::uint8_t code : out.mask) ASSERT_NE(code, kOccluded);
+}
+
+TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
+    const Rig rig = rig_at({0.3, 0.02, 0.05}, 320, 256, 0.85);
+    const Rendered scene = rendered(rig);
+    std::mt19937 random(1);
+    Image source(320, 256);
+    for (float& value : source.pixels) value = static_cast<float>(uniform(random, 0, 1));
+    const Registered expected = registered(rig, source, scene.depth, {1, false, true, 0});
+    for (const int threads : {2, 3, 16, 0}) {
+        const Registered out = registered(rig, source, scene.depth, {threads, false, true, 0});
+        EXPECT_EQ(out.mask, expected.mask) << threads << " threads";
+        EXPECT_EQ(out.image, expected.image) << threads << " threads";
+    }
+    for (std::int64_t targets = hwy::SupportedTargets() & HWY_TARGETS; targets != 0;
+         targets &= targets - 1) {
+        const std::int64_t target = targets & -targets;
+        hwy::SetSupportedTargetsForTest(target);
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+        const Registered out = registered(rig, source, scene.depth, {1, false, true, 0});
+        // How many pixels are splat at once depends on the vector's length.
+        int differ = 0;
+        for (std::size_t i = 0; i < out.mask.size(); ++i) differ += out.mask[i] != expected.mask[i];
+        EXPECT_LT(differ, kWidth * kHeight / 1000) << hwy::TargetName(target);
+    }
+    hwy::SetSupportedTargetsForTest(0);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+TEST(Occlusion, TheMapHasNoPlaceForWhatIsHidden) {
+    const Rig rig = rig_at({0.3, 0.02, 0.05}, 320, 256, 0.85);
+    const Rendered scene = rendered(rig);
+    const Registered out = registered(rig, Image(320, 256, 1.0f), scene.depth, {1, false, true, 0});
+    std::vector<float> map(2 * kWidth * kHeight);
+    Registrar(rig, {2, false, true, 0}).map(scene.depth.view(), map.data());
+    for (int i = 0; i < kWidth * kHeight; ++i)
+        ASSERT_EQ(std::isnan(map[2 * i]), out.mask[i] != 0) << i;
+}
+
+}  // namespace
+}  // namespace xcalib

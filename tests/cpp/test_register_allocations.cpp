@@ -1,0 +1,62 @@
+// A program of its own: it counts what operator new is asked for.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+#include "xcalib/register.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+
+void* counted(std::size_t size) {
+    ++allocations;
+    if (void* memory = std::malloc(size ? size : 1)) return memory;
+    throw std::bad_alloc();
+}
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace xcalib {
+namespace {
+
+TEST(Registrar, AllocatesNothingOnceTheFirstFrameIsThrough) {
+    Rig rig{Pinhole::from_hfov(321, 240, 0.9), Pinhole::from_hfov(160, 128, 0.9), {}};
+    rig.source_from_reference.translation = {-0.3, 0.01, 0.02};
+    const std::vector<float> source(160 * 128, 0.5f);
+    std::vector<float> depth(321 * 240, 8.0f), out(321 * 240);
+    for (int y = 60; y < 150; ++y)
+        for (int x = 100; x < 160; ++x) depth[y * 321 + x] = 2.0f;
+    std::vector<std::uint8_t> mask(321 * 240);
+    std::vector<float> map(2 * 321 * 240);
+    for (const int threads : {1, 2, 4})
+        for (const bool occlusion : {false, true}) {
+            const Registrar registrar(rig, {threads, false, occlusion, 0});
+            const auto frame = [&] {
+                registrar.register_frame({source.data(), 160, 128, 1, PixelType::f32, 640},
+                                         {depth.data(), 321, 240, 1, PixelType::f32, 1284},
+                                         {out.data(), 321, 240, 1, PixelType::f32, 1284},
+                                         mask.data());
+                registrar.map({depth.data(), 321, 240, 1, PixelType::f32, 1284}, map.data());
+            };
+            const long before = allocations;
+            frame();
+            if (occlusion) {
+                EXPECT_GT(allocations, before) << "the count counts";
+            }
+            const long warm = allocations;
+            for (int i = 0; i < 20; ++i) frame();
+            EXPECT_EQ(allocations, warm) << threads << " threads, occlusion " << occlusion;
+        }
+}
+
+}  // namespace
+}  // namespace xcalib

@@ -1,0 +1,240 @@
+// The registrar's kernel on every instruction set that this machine has, against the equation in
+// double.
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "scenes.hpp"
+#include "xcalib/register.hpp"
+
+namespace xcalib {
+namespace {
+
+using namespace ::xcalib::testing;  // NOLINT: scenes.hpp
+
+// Calls `work` once for each instruction set, and leaves the choice as it was.
+template <class Work>
+void on_every_target(const Work& work) {
+    int count = 0;
+    for (std::int64_t targets = hwy::SupportedTargets() & HWY_TARGETS; targets != 0;
+         targets &= targets - 1) {
+        const std::int64_t target = targets & -targets;
+        hwy::SetSupportedTargetsForTest(target);
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+        SCOPED_TRACE(hwy::TargetName(target));
+        work();
+        ++count;
+    }
+    hwy::SetSupportedTargetsForTest(0);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    EXPECT_GE(count, 2) << "the baseline and at least one more";
+}
+
+template <class T>
+PixelType type_of() {
+    return sizeof(T) == 1 ? PixelType::u8 : sizeof(T) == 2 ? PixelType::u16 : PixelType::f32;
+}
+
+template <class T>
+struct Frame {
+    int width, height, channels;
+    std::vector<T> values;
+
+    Frame(int w, int h, int c) : width(w), height(h), channels(c), values(std::size_t(w) * h * c) {}
+    std::ptrdiff_t row_bytes() const { return std::ptrdiff_t(sizeof(T)) * width * channels; }
+    ImageView view() const {
+        return {values.data(), width, height, channels, type_of<T>(), row_bytes()};
+    }
+    MutableImageView mutable_view() {
+        return {values.data(), width, height, channels, type_of<T>(), row_bytes()};
+    }
+    double at(int x, int y, int c) const {
+        return static_cast<double>(values[(std::size_t(y) * width + x) * channels + c]);
+    }
+};
+
+template <class T>
+Frame<T> random_frame(std::mt19937& random, int width, int height, int channels) {
+    Frame<T> frame(width, height, channels);
+    const double top = std::is_floating_point_v<T> ? 1 : std::numeric_limits<T>::max() + 1.0;
+    for (T& value : frame.values) value = static_cast<T>(uniform(random, 0, top));
+    return frame;
+}
+
+// Where a pixel lies, in double, and how far floats may be off.
+struct Place {
+    double u, v, z, slack;
+};
+
+Place place(const Rig& rig, int x, int y, double depth) {
+    const Eigen::Matrix3d h = infinite_homography(rig);
+    const Eigen::Vector3d k = rig.source.K() * rig.t(), pixel(x, y, 1);
+    const Eigen::Vector3d p = depth * h * pixel + k;
+    // Every term may be off by some units of its last place, and the quotient's slope carries it
+    // on.
+    const Eigen::Vector3d off = 8 * 6e-8 * (depth * h.cwiseAbs() * pixel + k.cwiseAbs());
+    const double u = p.x() / p.z(), v = p.y() / p.z(), z = std::abs(p.z());
+    const double rounding =
+        std::max(off.x() + std::abs(u) * off.z(), off.y() + std::abs(v) * off.z());
+    return {u, v, p.z(), rounding / z + 1e-6};
+}
+
+// A registered frame, pixel by pixel. Returns how many pixels were valid.
+template <class T, class Depth>
+int expect_by_the_book(const Rig& rig, const Frame<T>& source, const std::vector<Depth>& depth,
+                       double scale) {
+    const int width = rig.reference.width, height = rig.reference.height;
+    Frame<T> out(width, height, source.channels);
+    std::vector<std::uint8_t> mask(std::size_t(width) * height, 9);
+    std::vector<float> map(2 * mask.size());
+    const ImageView depth_view{
+        depth.data(), width, height, 1, type_of<Depth>(), std::ptrdiff_t(sizeof(Depth)) * width};
+    RegistrarOptions options;
+    options.num_threads = 1;
+    options.occlusion = false;
+    options.depth_scale = std::is_same_v<Depth, float> ? 0 : scale;
+    const Registrar registrar(rig, options);
+    registrar.register_frame(source.view(), depth_view, out.mutable_view(), mask.data());
+    registrar.map(depth_view, map.data());
+    const double right = source.width - 1, bottom = source.height - 1;
+    const double range = std::is_floating_point_v<T> ? 1 : double(std::numeric_limits<T>::max());
+    int valid = 0;
+    for (int i = 0; i < width * height; ++i) {
+        const double d = depth[i] * scale;
+        const int code = mask[i];
+        const std::string where = "pixel " + std::to_string(i % width) + ", " +
+                                  std::to_string(i / width) + " of " + std::to_string(width) + "x" +
+                                  std::to_string(height) + ", depth " + std::to_string(d);
+        EXPECT_EQ(code == 0, !std::isnan(map[2 * i])) << where;
+        if (!(d > 0) || std::isinf(d)) {
+            EXPECT_EQ(code, 3) << where;
+        } else {
+            const Place p = place(rig, i % width, i / width, d);
+            const double beyond = std::max({-p.u, p.u - right, -p.v, p.v - bottom});
+            const bool behind = p.z<kNearestZ * 0.99, ahead = p.z> kNearestZ * 1.01;
+            if (behind || beyond > 1e-3 + p.slack) {
+                EXPECT_EQ(code, 1) << where;
+            }
+            if (ahead && beyond < -p.slack) {
+                EXPECT_EQ(code, 0) << where;
+            }
+        }
+        if (code != 0) {
+            for (int c = 0; c < source.channels; ++c)
+                EXPECT_EQ(out.at(i % width, i / width, c), 0) << where;
+            continue;
+        }
+        ++valid;
+        const Place p = place(rig, i % width, i / width, d);
+        const double u = std::clamp(p.u, 0.0, right), v = std::clamp(p.v, 0.0, bottom);
+        EXPECT_NEAR(map[2 * i], u, p.slack) << where;
+        EXPECT_NEAR(map[2 * i + 1], v, p.slack) << where;
+        const int x = std::min(static_cast<int>(u), source.width - 2);
+        const int y = std::min(static_cast<int>(v), source.height - 2);
+        const double a = u - x, b = v - y;
+        for (int c = 0; c < source.channels; ++c) {
+            const double value =
+                (1 - b) * ((1 - a) * source.at(x, y, c) + a * source.at(x + 1, y, c)) +
+                b * ((1 - a) * source.at(x, y + 1, c) + a * source.at(x + 1, y + 1, c));
+            const double tolerance =
+                range * (2 * p.slack + 1e-6) + (std::is_floating_point_v<T> ? 0.0 : 0.5);
+            EXPECT_NEAR(out.at(i % width, i / width, c), value, tolerance) << where;
+        }
+    }
+    return valid;
+}
+
+std::vector<float> some_depth(std::mt19937& random, int count) {
+    std::vector<float> depth(count);
+    const bool smooth = random() % 2;  // the usual case, and the one that is not
+    const double base = uniform(random, 1, 20);
+    for (float& d : depth) d = static_cast<float>(smooth ? base : std::exp(uniform(random, -1, 4)));
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    const float odd[] = {0.0f,
+                         -0.0f,
+                         -2.0f,
+                         std::numeric_limits<float>::quiet_NaN(),
+                         -std::numeric_limits<float>::quiet_NaN(),
+                         kInfinity,
+                         -kInfinity,
+                         1e-4f,
+                         1e-42f,
+                         1e30f};
+    for (const float value : odd)
+        if (random() % 2) depth[random() % depth.size()] = value;
+    return depth;
+}
+
+// Cameras that hardly look the same way, beside and ahead of each other, of any scale.
+Rig any_rig(std::mt19937& random, int width, int height, int source_width, int source_height) {
+    Rig rig = random_rig(random, width, height, source_width, source_height);
+    const double zoom = std::exp(uniform(random, -1, 1));
+    rig.source.fx *= zoom;
+    rig.source.fy *= zoom;
+    switch (random() % 4) {
+        case 0: break;
+        case 1: rig = turned(rig, {0, 0, uniform(random, -3.1, 3.1)}); break;
+        case 2: rig = turned(rig, {uniform(random, -1, 1), uniform(random, -2, 2), 0}); break;
+        case 3:  // points on both sides of the source camera's plane, and close to it
+            rig.source_from_reference.translation.z() = -uniform(random, 1, 20);
+            break;
+    }
+    return rig;
+}
+
+template <class T>
+void expect_every_path_agrees(unsigned seed, int channels) {
+    on_every_target([&] {
+        std::mt19937 random(seed);
+        int valid = 0;
+        for (const int width : {1, 2, 3, 7, 8, 9, 15, 16, 17, 31, 33, 63, 64, 65, 100})
+            for (const auto& [source_width, source_height] :
+                 {std::pair{2, 2}, {3, 2}, {9, 11}, {16, 5}, {17, 18}, {40, 30}, {129, 64}}) {
+                const int height = 1 + static_cast<int>(random() % 9);
+                const Rig rig = any_rig(random, width, height, source_width, source_height);
+                const auto source = random_frame<T>(random, source_width, source_height, channels);
+                const std::vector<float> depth = some_depth(random, width * height);
+                valid += expect_by_the_book(rig, source, depth, 1);
+                std::vector<std::uint16_t> units(depth.size());
+                for (std::uint16_t& d : units) d = static_cast<std::uint16_t>(random() % 5000);
+                valid += expect_by_the_book(rig, source, units, 1.0 / 256);
+                if (::testing::Test::HasFailure()) return;
+            }
+        EXPECT_GT(valid, 1000);
+    });
+}
+
+TEST(RegisterPaths, AgreeOnBytes) { expect_every_path_agrees<std::uint8_t>(1, 1); }
+TEST(RegisterPaths, AgreeOnBytesInColour) { expect_every_path_agrees<std::uint8_t>(2, 3); }
+TEST(RegisterPaths, AgreeOn16Bits) { expect_every_path_agrees<std::uint16_t>(3, 1); }
+TEST(RegisterPaths, AgreeOn16BitsInColour) { expect_every_path_agrees<std::uint16_t>(4, 3); }
+TEST(RegisterPaths, AgreeOnFloats) { expect_every_path_agrees<float>(5, 1); }
+TEST(RegisterPaths, AgreeOnFloatsInColour) { expect_every_path_agrees<float>(6, 3); }
+
+// Nothing is read beside the source: what lies there would come through as NaN or as a crash under
+// the address sanitizer, and rows need not be in order.
+TEST(RegisterPaths, RowsOfTheSourceMayLieAnyWay) {
+    on_every_target([] {
+        std::mt19937 random(7);
+        const Rig rig = random_rig(random, 64, 48, 50, 40);
+        const auto source = random_frame<std::uint8_t>(random, 50, 40, 1);
+        std::vector<std::uint8_t> upside_down(source.values.size());
+        for (int y = 0; y < 40; ++y)
+            std::copy_n(source.values.data() + 50 * y, 50, upside_down.data() + 50 * (39 - y));
+        const Image depth(64, 48, 5.0f);
+        Frame<std::uint8_t> expected(64, 48, 1), found(64, 48, 1);
+        std::vector<std::uint8_t> mask(64 * 48), other_mask(mask);
+        const Registrar registrar(rig, RegistrarOptions{1});
+        registrar.register_frame(source.view(), depth.view(), expected.mutable_view(), mask.data());
+        const ImageView flipped{upside_down.data() + 50 * 39, 50, 40, 1, PixelType::u8, -50};
+        registrar.register_frame(flipped, depth.view(), found.mutable_view(), other_mask.data());
+        EXPECT_EQ(found.values, expected.values);
+        EXPECT_EQ(other_mask, mask);
+    });
+}
+
+}  // namespace
+}  // namespace xcalib
