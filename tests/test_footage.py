@@ -14,12 +14,15 @@ import pytest
 
 from conftest import FRAMES, run
 from xcalib import Pinhole, Rig, synthetic
-from xcalib.depth import read_depth
+from xcalib.depth import FolderDepth, PlaneDepth, read_depth
 from xcalib.footage import (
+    Matching,
+    OffsetEstimate,
     Stream,
     camera_infos,
     estimate_offset,
     match_depths,
+    offsets_around,
     open_pairs,
     open_stream,
     pair_streams,
@@ -28,7 +31,7 @@ from xcalib.footage import (
     refine_offset,
 )
 from xcalib.footage.writer import VideoSink
-from xcalib.frames import Image, InputError, list_files, read_image, write_image
+from xcalib.frames import DecodeError, Image, InputError, list_files, read_image, write_image
 
 Refused = Callable[..., str]
 
@@ -429,6 +432,9 @@ def textured(seed: int) -> Image:
 
 VISIBLE = textured(0)
 THERMAL = 255 - np.abs(VISIBLE * 1.7 % 510 - 255)
+CAMERA = Pinhole(240, 160, 200, 200, 119.5, 79.5)
+IDENTITY = Rig(CAMERA, CAMERA)
+"""The rig of two `pans`."""
 
 
 class Pan(Stream):
@@ -500,11 +506,12 @@ def test_offset_is_refined_by_registration(rendered: Path) -> None:
     visible, thermal = open_stream(rendered / "visible"), open_stream(rendered / "thermal")
     visible.times, thermal.times = np.arange(FRAMES) * 0.5, np.arange(FRAMES) * 0.5 + 0.5
     depths = list_files(rendered / "depth")
-    best, scores = refine_offset(
-        rig, visible, thermal, lambda index, _: read_depth(depths[index]), [0, 0.5, 1.0], 3
-    )
-    assert best == 0.5
-    assert scores[1] > max(scores[0], scores[2])
+    provider = FolderDepth(rendered / "depth", list_files(rendered / "visible"))
+    found = refine_offset(rig, visible, thermal, provider, [0, 0.5, 1.0], 3)
+    assert found.told and found.offset == 0.5
+    assert found.scores[1] > max(found.scores[0], found.scores[2])
+    # The guess, in the middle, is a frame off.
+    assert refine_offset(rig, visible, thermal, provider, [0, 0.5, 1.0, 1.5], 3).offset == 0.5
 
 
 # -- The commands
@@ -609,17 +616,61 @@ def test_register_estimates_how_late_the_source_is(tmp_path: Path) -> None:
     v, t = (
         write_video(tmp_path / f"{name}.mkv", list(pan), "FFV1", 30) for name, pan in scenes.items()
     )
-    camera = Pinhole(240, 160, 200, 200, 119.5, 79.5)
-    Rig(camera, camera).save(tmp_path / "rig.yaml")
+    IDENTITY.save(tmp_path / "rig.yaml")
     arguments = ("register", tmp_path / "rig.yaml", v, t, "--depth", "plane")
     result = run(*arguments, "--time-offset", "auto", "-o", tmp_path / "out.mkv")
     assert result.exit_code == 0, result.output
     found = re.search(r"clock offset: source late by ([+0-9.]+) s", result.stderr)
     assert found and float(found[1]) == pytest.approx(1 / 3, abs=0.008)
+    refined = re.search(r"register best with the source late by ([+0-9.]+) s", result.stderr)
+    assert refined and float(refined[1]) == pytest.approx(1 / 3, abs=0.02)
     assert "140 pairs by time" in result.stderr
     assert "10 reference, 10 source frames" in result.stderr
     # The rig is the identity: what is registered first is the source's eleventh frame.
     np.testing.assert_array_equal(open_stream(tmp_path / "out.mkv")[0], open_stream(t)[10])
+
+
+@pytest.mark.parametrize(("late", "rate"), [(1 / 3, 30), (0.15, 9)])
+def test_a_rig_corrects_the_estimated_offset(
+    monkeypatch: pytest.MonkeyPatch, late: float, rate: float
+) -> None:
+    """Two frames off, trusted or not: registration leads back; without motion it says so."""
+    visible, thermal = pans(late, rate)
+    monkeypatch.setattr("xcalib.footage.opening.open_stream", {"v": visible, "t": thermal}.get)
+    for trusted in (True, False):
+        peak = late + 2 / 30
+        wrong = OffsetEstimate(peak * trusted, trusted, 0.5 * trusted, 0.2, peak)
+        monkeypatch.setattr("xcalib.footage.opening.estimate_offset", lambda *_, w=wrong: w)
+        pairs = open_pairs("v", "t", Matching(time_offset=None))
+        assert pairs.pairing.offset == wrong.offset
+        refined = pairs.refined(IDENTITY, lambda _: PlaneDepth())
+        assert refined.pairing.offset == pytest.approx(late, abs=0.03)
+        assert len(refined.notes) == 2 + trusted
+        assert "frames register best with the source late by" in refined.notes[-2]
+        assert f"{refined.pairing.offset:+.4f} s" in refined.notes[-1]
+
+
+def test_a_rig_that_stands_still_tells_no_offset_by_registration() -> None:
+    visible, thermal = pans(0.15, moves=False)
+    candidates = offsets_around(0.1, visible, thermal)
+    found = refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates)
+    assert not found.told and found.offset == pytest.approx(0.1)
+    assert "change too little to tell" in found.line()
+
+
+def test_frames_that_cannot_be_decoded_do_not_hinder_the_offset() -> None:
+    visible, thermal = pans(0.2)
+    whole = thermal.read
+
+    def read(index: int) -> Image:
+        if index % 50 == 10:
+            raise DecodeError(f"pan frame {index}: cannot decode")
+        return whole(index)
+
+    thermal.read = read  # type: ignore[method-assign]
+    assert estimate_offset(visible, thermal).offset == pytest.approx(0.2, abs=0.008)
+    candidates = offsets_around(0.2, visible, thermal)
+    assert refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates, 40).told
 
 
 def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> None:

@@ -28,7 +28,7 @@ from .depth import (
     PlaneDepth,
 )
 from .depth.plane_fit import fit_plane, spread
-from .footage import Matching, Stream, open_pairs, open_sink
+from .footage import Matching, Pairs, Stream, open_pairs, open_sink
 from .footage.opening import PickedDepth
 from .footage.pairing import median_period
 from .frames import DecodeError, Image, InputError, fit_rig, overlay, size_of
@@ -77,9 +77,13 @@ class Frames:
         max_gap: float | None = Matching.max_gap,
         reference_times: Path | None = None,
         source_times: Path | None = None,
+        rig: Rig | None = None,
         **measured: Any,
     ) -> Frames:
-        """Open frames as the arguments of the commands name them; the rest is `MeasuredDepth`."""
+        """Open frames as the arguments of the commands name them; the rest is `MeasuredDepth`.
+
+        With a ``rig`` an estimated clock offset is refined, see `Pairs.refined`.
+        """
         matching = Matching(pairing, time_offset, max_gap, reference_times, source_times)
         pairs = open_pairs(reference, source, matching)
         plane = PlaneDepth(camera_height, horizon, far, plane_hfov, plane_roll)
@@ -92,8 +96,13 @@ class Frames:
             threads,
         )
         given = depth_scale, plane, network, MeasuredDepth(**measured)
-        depth = pairs.open_depth(depth_spec, *given)
-        return Frames(pairs.references, pairs.sources, depth, pairs.notes)
+
+        def open_depth(pairs: Pairs) -> DepthProvider:
+            return pairs.open_depth(depth_spec, *given)
+
+        if rig is not None:
+            pairs = pairs.refined(rig, open_depth)
+        return Frames(pairs.references, pairs.sources, open_depth(pairs), pairs.notes)
 
     def __len__(self) -> int:
         return len(self.references)

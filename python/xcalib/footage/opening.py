@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import Rig
 from ..depth import (
     DEPTH_SUFFIXES,
     PNG_SCALE,
@@ -20,7 +23,7 @@ from ..depth import (
 )
 from ..depth.points import POINT_SUFFIXES
 from ..frames import Image, InputError, list_files
-from .offset import estimate_offset
+from .offset import OffsetEstimate, estimate_offset, offsets_around, refine_offset
 from .pairing import Pairing, match_depths, pair_streams
 from .sources import open_stream
 from .stream import Picked, Stream
@@ -61,6 +64,9 @@ class Pairs:
     pairing: Pairing
     notes: tuple[str, ...]
     """What the user should know, a line each."""
+    matching: Matching = Matching()
+    estimate: OffsetEstimate | None = None
+    """Of the clock offset, where that was asked for."""
 
     @property
     def references(self) -> Stream:
@@ -71,6 +77,35 @@ class Pairs:
     def sources(self) -> Stream:
         """Their partners, in the same order."""
         return _picked(self.all_sources, self.pairing.sources)
+
+    def refined(self, rig: Rig, open_depth: Callable[[Pairs], DepthProvider]) -> Pairs:
+        """Paired anew with the offset at which frames register best with the rig, `refine_offset`.
+
+        ``open_depth`` gives the depth of the `references` of pairs. Without an estimated offset
+        the pairs stay as they are, and so they do where the registered frames do not tell.
+        """
+        if self.estimate is None:
+            return self
+        streams = self.all_references, self.all_sources
+        candidates = offsets_around(self.estimate.peak, *streams)
+        wide, depth = self, None
+        if len(self.all_references) > len(self.all_sources):
+            # The neighbours of a paired reference tell too, if there is depth of them.
+            at_any = [pair_streams(*streams, "time", offset).references for offset in candidates]
+            every = np.unique(np.concatenate(at_any))
+            wide = replace(self, pairing=replace(self.pairing, references=every))
+            with contextlib.suppress(InputError):
+                depth = open_depth(wide)
+        if depth is None:
+            wide, depth = self, open_depth(self)
+        found = refine_offset(rig, wide.references, self.all_sources, depth, candidates)
+        notes = [f"clock offset: {found.line()}"]
+        if self.estimate.trusted or not found.told:
+            notes.insert(0, self.notes[0])
+        pairing = self.pairing
+        if found.told:
+            pairing = pair_streams(*streams, "time", found.offset, self.matching.max_gap)
+        return replace(self, pairing=pairing, notes=(*notes, f"frames: {pairing.line()}"))
 
     def open_depth(
         self,
@@ -113,7 +148,7 @@ def open_pairs(
         if table is not None:
             stream.times = read_times(table, stream)
     notes: list[str] = []
-    offset = matching.time_offset
+    offset, estimate = matching.time_offset, None
     if offset is None:
         if matching.method not in ("auto", "time"):
             raise InputError(
@@ -125,4 +160,4 @@ def open_pairs(
     pairing = pair_streams(*streams, matching.method, offset, matching.max_gap)
     if pairing.method == "time":
         notes.append(f"frames: {pairing.line()}")
-    return Pairs(*streams, pairing, tuple(notes))
+    return Pairs(*streams, pairing, tuple(notes), matching, estimate)
