@@ -505,7 +505,6 @@ def test_offset_is_refined_by_registration(rendered: Path) -> None:
     rig = Rig.load(rendered / "rig.yaml")
     visible, thermal = open_stream(rendered / "visible"), open_stream(rendered / "thermal")
     visible.times, thermal.times = np.arange(FRAMES) * 0.5, np.arange(FRAMES) * 0.5 + 0.5
-    depths = list_files(rendered / "depth")
     provider = FolderDepth(rendered / "depth", list_files(rendered / "visible"))
     found = refine_offset(rig, visible, thermal, provider, [0, 0.5, 1.0], 3)
     assert found.told and found.offset == 0.5

@@ -309,5 +309,5 @@ def _chosen(candidates: Sequence[float], scores: Array) -> RefinedOffset:
     error = lost.std(axis=0, ddof=1) / np.sqrt(len(scores))
     worse = lost.mean(axis=0) > np.maximum(2 * error, 1e-12)
     told = bool(worse[0] and worse[-1])
-    near = min(np.flatnonzero(~worse), key=lambda place: abs(int(place) - middle))
+    near = min(np.flatnonzero(~worse).tolist(), key=lambda place: abs(place - middle))
     return RefinedOffset(float(candidates[near if told else middle]), told, means.tolist())
