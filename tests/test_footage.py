@@ -18,6 +18,8 @@ from xcalib.depth import FolderDepth, PlaneDepth, read_depth
 from xcalib.footage import (
     Matching,
     OffsetEstimate,
+    Pairing,
+    Pairs,
     Stream,
     camera_infos,
     estimate_offset,
@@ -193,6 +195,16 @@ def test_a_seek_that_leads_astray_is_not_believed(
         np.testing.assert_array_equal(video[index], frames[index])
 
 
+def test_h264() -> None:
+    """Thirty frames with B-frames between; each is lighter than the last by 6 levels."""
+    video = open_stream(Path(__file__).parent / "data" / "h264.mp4")
+    assert len(video) == 30
+    np.testing.assert_allclose(video.times, np.arange(30) / 20, atol=2e-3)
+    assert video[0].shape == (48, 64, 3)
+    for index in (*range(30), 29, 2, 17, 0):
+        assert np.median(video[index]) == pytest.approx(30 + 6 * index, abs=4)
+
+
 def test_halves(tmp_path: Path) -> None:
     frames = moving(3)
     path = write_video(tmp_path / "w.mkv", frames, "FFV1")
@@ -245,7 +257,10 @@ def encoded(image: Image, encoding: str) -> Image:
 
 
 def write_bag(path: Path, kind: str, topics: dict[str, tuple[str, list[Image]]]) -> str:
-    """A bag with topics of (encoding, images), 0.1 s apart, and a camera_info; what to open."""
+    """A bag with topics of (encoding, images), 0.1 s apart, and a camera_info; what to open.
+
+    Compressed: ``png``, or ``KIND; CODEC`` with the bytes themselves for images.
+    """
     pytest.importorskip("rosbags")
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
@@ -266,13 +281,14 @@ def write_bag(path: Path, kind: str, topics: dict[str, tuple[str, list[Image]]])
         writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
     with writer:
         for number, (topic, (encoding, images)) in enumerate(topics.items()):
-            name = "sensor_msgs/msg/" + ("CompressedImage" if encoding == "png" else "Image")
+            compressed = encoding == "png" or ";" in encoding
+            name = "sensor_msgs/msg/" + ("CompressedImage" if compressed else "Image")
             connection = writer.add_connection(topic, name, typestore=store)
             for index, image in enumerate(images):
                 stamp = 1_700_000_000_000_000_000 + index * 100_000_000 + number * 10_000_000
-                if encoding == "png":
-                    data = cv2.imencode(".png", image)[1].ravel()
-                    message = types[name](header(stamp), "png", data)
+                if compressed:
+                    data = cv2.imencode(".png", image)[1].ravel() if encoding == "png" else image
+                    message = types[name](header(stamp), encoding, data)
                 else:
                     pixels = np.ascontiguousarray(encoded(image, encoding))
                     height, width = image.shape[:2]
@@ -317,6 +333,101 @@ def test_bags(tmp_path: Path, kind: str) -> None:
     assert "FX,FY,CX,CY 300,301,160,120 px" in result.stdout
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
+def test_bayer(tmp_path: Path, pattern: str, dtype: type) -> None:
+    (colour,) = moving(1, dtype, channels=3)
+    y, x = np.mgrid[:120, :160]
+    channel = np.array(["bgr".index(letter) for letter in pattern])[y % 2 * 2 + x % 2]
+    mosaic = np.take_along_axis(colour, channel[..., None], axis=2)[..., 0]
+    encoding = f"bayer_{pattern}{8 * np.dtype(dtype).itemsize}"
+    stream = open_stream(write_bag(tmp_path / "b", "sqlite", {"/raw": (encoding, [mosaic])}))
+    assert stream[0].dtype == dtype
+    error = np.abs(stream[0].astype(int) - colour.astype(int))[2:-2, 2:-2]
+    assert error.max() < 0.03 * np.iinfo(dtype).max
+
+
+def compressed_depth(values: Image, scale: float = 0, shift: float = 0) -> Image:
+    """As image_transport's compressed_depth writes it: a header of 12 bytes, and a PNG."""
+    header = np.array([scale, shift], "<f4").view(np.uint8)
+    png = cv2.imencode(".png", values)[1].ravel()
+    return np.concatenate([np.zeros(4, np.uint8), header, png])
+
+
+def test_compressed_depth(tmp_path: Path) -> None:
+    millimetres = np.arange(0, 60000, 50, np.uint16).reshape(30, 40)
+    metres = (millimetres * np.float32(1e-3)).clip(0, 10)
+    # As compressed_depth_image_transport quantizes: nearer is finer, 0 is unknown.
+    shift = 1 - 100.0 * (100.0 + 1) / 10
+    scale = 100.0 * (100.0 + 1)
+    with np.errstate(divide="ignore"):
+        codes = np.where(metres > 0, np.clip(scale / metres + shift, 0, 65535), 0)
+    topics = {
+        "/mm": ("16UC1; compressedDepth png", [compressed_depth(millimetres)]),
+        "/m": (
+            "32FC1; compressedDepth",
+            [compressed_depth(codes.astype(np.uint16), scale, shift)],
+        ),
+        "/rvl": ("16UC1; compressedDepth rvl", [np.zeros(40, np.uint8)]),
+    }
+    bag = write_bag(tmp_path / "b", "mcap", topics)
+    np.testing.assert_array_equal(open_stream(f"{bag}#/mm")[0], millimetres)
+    found = open_stream(f"{bag}#/m")[0]
+    assert found.dtype == np.float32
+    told = metres > 0.2  # codes end at 65535
+    np.testing.assert_allclose(found[told], metres[told], rtol=0.002)
+    assert found[0, 0] == 0
+    with pytest.raises(DecodeError, match=r"frame 0: cannot decode 28 bytes, .* rvl"):
+        open_stream(f"{bag}#/rvl")[0]
+
+
+@pytest.mark.parametrize("kind", ["16UC1", "32FC1", "16UC1; compressedDepth"])
+def test_depth_from_a_topic(rendered: Path, tmp_path: Path, kind: str) -> None:
+    names = "visible", "thermal", "depth"
+    files = [list_files(rendered / name) for name in names]
+    visible, thermal = ([read_image(path) for path in paths] for paths in files[:2])
+    metres = [read_depth(path) for path in files[2]]
+    depth = metres
+    if kind != "32FC1":
+        depth = [np.where(m < 65, 1e3 * m, 0).round().astype(np.uint16) for m in metres]
+    if ";" in kind:
+        depth = [compressed_depth(values) for values in depth]
+    topics = {"/v": ("bgr8", visible), "/t": ("mono8", thermal), "/depth": (kind, depth)}
+    bag = write_bag(tmp_path / "drive.bag", "ros1", topics)
+    rig, out = rendered / "rig.yaml", tmp_path / "out"
+    frames = (f"{bag}#/v", f"{bag}#/t", "--depth", f"{bag}#/depth")
+    result = run("register", rig, *frames, "-o", out)
+    assert result.exit_code == 0, result.output
+    inputs = (rendered / "visible", rendered / "thermal", "--depth", rendered / "depth")
+    assert run("register", rig, *inputs, "-o", tmp_path / "true").exit_code == 0
+    for found, true in zip(list_files(out), list_files(tmp_path / "true"), strict=True):
+        error = np.abs(read_image(found).astype(int) - read_image(true).astype(int))
+        assert np.percentile(error[read_image(out / "masks" / found.name) == 0], 99) <= 2
+
+
+def test_depth_topics_are_matched_by_time_or_in_order(tmp_path: Path) -> None:
+    metres = [np.full((30, 40), 1 + i, np.float32) for i in range(6)]
+    bag = write_bag(tmp_path / "b", "sqlite", {"/depth": ("32FC1", metres)})
+    stamps = 1_700_000_000.0 + 0.1 * np.arange(6)
+    image = np.zeros((60, 80), np.uint8)
+    for times, used, expected in (
+        (stamps[[1, 4]] + 0.02, [0, 1], [2, 5]),
+        (None, [0, 2, 3], [1, 3, 4]),
+    ):
+        references = Listed([image] * (6 if times is None else 2), times)
+        pairing = Pairing("order", np.array(used), np.array(used))
+        depth = Pairs(references, references, pairing, ()).open_depth(f"{bag}#/depth")
+        assert [depth(i, image).mean() for i in range(len(used))] == expected
+    pairs = Pairs(*[Listed([image] * 4)] * 2, Pairing("order", np.arange(3), np.arange(3)), ())
+    with pytest.raises(InputError, match="first of 6 depth maps, memory frame 0 of 4 reference"):
+        pairs.open_depth(f"{bag}#/depth")
+    with pytest.raises(InputError, match="depth is 40x30, but the reference image is 80x80"):
+        depth(0, np.zeros((80, 80), np.uint8))
+    grey = write_bag(tmp_path / "c", "sqlite", {"/grey": ("mono8", [image] * 4)})
+    with pytest.raises(InputError, match="depth is 60x80 uint8, expected 32FC1 in metres or 16UC1"):
+        Pairs(*[Listed([image] * 4)] * 2, pairing, ()).open_depth(grey)(0, image)
+
+
 def test_bags_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     with pytest.raises(InputError, match=r"a\.mcap: bags need .* install xcalib-rgbt\[ros\]"):
@@ -339,6 +450,66 @@ def test_bad_bags(tmp_path: Path) -> None:
     stream = open_stream(write_bag(tmp_path / "b.bag", "ros1", {"/x": ("strange", moving(1))}))
     with pytest.raises(InputError, match="encoding is 'strange', expected one of mono8"):
         stream[0]
+
+
+def test_frames_that_cannot_be_decoded_are_told_from_wrong_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What `calibrate` may leave out: a page, a frame of a video, a message."""
+    frames = moving(4, np.uint16)
+    cv2.imwritemulti(str(tmp_path / "s.tiff"), frames)
+    pages = open_stream(tmp_path / "s.tiff")
+    data = bytearray((tmp_path / "s.tiff").read_bytes())
+    data[8:2000] = bytes(1992)  # pixels of the first page
+    (tmp_path / "s.tiff").write_bytes(data)
+    with pytest.raises(DecodeError, match=r"s\.tiff page 0: cannot decode"):
+        pages[0]
+    np.testing.assert_array_equal(pages[3], frames[3])
+
+    topics = {"/png": ("png", frames), "/jpg": ("bgr8; jpeg compressed bgr8", [])}
+    jpeg = cv2.imencode(".jpg", moving(1)[0])[1].ravel()
+    topics["/jpg"][1].extend([jpeg, jpeg[: len(jpeg) // 2], np.zeros(0, np.uint8), jpeg])
+    stream = open_stream(write_bag(tmp_path / "b", "sqlite", topics) + "#/jpg")
+    for index in (1, 2):
+        with pytest.raises(DecodeError, match=f"frame {index}: cannot decode .* bytes"):
+            stream[index]
+    assert stream[3].shape == (120, 160)
+
+    video = open_stream(write_video(tmp_path / "v.mkv", moving(90), "FFV1"))
+    video[0]
+    capture = video._capture  # type: ignore[attr-defined]
+
+    class Broken:
+        def __getattr__(self, name: str) -> Any:
+            return getattr(capture, name)
+
+        def grab(self) -> bool:
+            return False
+
+    monkeypatch.setattr(video, "_capture", Broken())
+    with pytest.raises(DecodeError, match=r"v\.mkv frame 1: cannot decode"):
+        video[1]
+    monkeypatch.setattr(video, "_capture", capture)
+    for index in (2, 70):
+        np.testing.assert_array_equal(video[index], moving(90)[index])
+
+
+def test_calibrate_leaves_out_messages_that_cannot_be_decoded(
+    rendered: Path, tmp_path: Path
+) -> None:
+    visible, thermal = (
+        [cv2.imencode(".png", read_image(path))[1].ravel() for path in list_files(rendered / name)]
+        for name in ("visible", "thermal")
+    )
+    thermal[2] = thermal[2][: len(thermal[2]) // 2]
+    kind = "bgr8; png compressed bgr8"
+    bag = write_bag(tmp_path / "b", "mcap", {"/v": (kind, visible), "/t": (kind, thermal)})
+    frames = (f"{bag}#/v", f"{bag}#/t", "--depth", rendered / "depth", "--working-width", 160)
+    for choose in ("informed", "spread"):
+        result = run("calibrate", *frames, "--choose", choose, "-o", tmp_path / "rig.yaml")
+        assert result.exit_code in (0, 3), result.output
+        assert "1 unusable frame is left out;" in result.stderr
+        assert "#/t frame 2: cannot decode" in result.stderr
 
 
 # -- Pairing

@@ -28,7 +28,7 @@ from .depth import (
     PlaneDepth,
 )
 from .depth.plane_fit import fit_plane, spread
-from .footage import Matching, Pairs, Stream, open_pairs, open_sink
+from .footage import Matching, Pairs, Stream, TopicDepth, open_pairs, open_sink
 from .footage.opening import PickedDepth
 from .footage.pairing import median_period
 from .frames import DecodeError, Image, InputError, fit_rig, overlay, size_of
@@ -129,7 +129,7 @@ class Frames:
 
 def choose_by_content(frames: Frames, max_frames: int, seed: int, quiet: bool = False) -> Choice:
     """The frames that say most about the rig, see `choose`. Depth counts where it is cheap."""
-    cheap = isinstance(frames.given_depth, FolderDepth | PlaneDepth)
+    cheap = isinstance(frames.given_depth, FolderDepth | PlaneDepth | TopicDepth)
 
     def read(index: int) -> tuple[Image, Image, NDArray[np.float32] | None]:
         if cheap:

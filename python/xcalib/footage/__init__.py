@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from .bag import BagImages, CameraInfo, camera_infos, is_bag
+from .depth_topic import TopicDepth
 from .files import ImageFiles, Pages
 from .offset import OffsetEstimate, RefinedOffset, estimate_offset, offsets_around, refine_offset
 from .opening import Matching, Pairs, open_pairs
@@ -34,6 +35,7 @@ __all__ = [
     "RefinedOffset",
     "Sink",
     "Stream",
+    "TopicDepth",
     "Video",
     "camera_infos",
     "estimate_offset",

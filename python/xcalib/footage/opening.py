@@ -23,8 +23,9 @@ from ..depth import (
 )
 from ..depth.points import POINT_SUFFIXES
 from ..frames import Image, InputError, list_files
+from .depth_topic import TopicDepth, is_depth_topic
 from .offset import OffsetEstimate, estimate_offset, offsets_around, refine_offset
-from .pairing import Pairing, match_depths, pair_streams
+from .pairing import Pairing, match_depth_stream, match_depths, pair_streams
 from .sources import open_stream
 from .stream import Picked, Stream
 from .times import read_times
@@ -115,8 +116,16 @@ class Pairs:
         network: NetworkOptions | None = None,
         measured: MeasuredDepth | None = None,
     ) -> DepthProvider:
-        """Depth of `references`; of a folder the files that `match_depths` finds."""
+        """Depth of `references`: of a folder the files that `match_depths` finds, of a bag's topic
+        the frames that `match_depth_stream` does.
+        """
         used, folder = self.pairing.references, Path(spec)
+        if is_depth_topic(spec):
+            stream = open_stream(spec)
+            matched = match_depth_stream(self.all_references, used, stream)
+            measured = measured or MeasuredDepth()
+            provider = measured.open(spec, []) or TopicDepth(stream)
+            return PickedDepth(measured.conditioned(provider), matched)
         given = scale, plane, network, measured
         if spec == "plane" or not folder.is_dir():
             stream = self.all_references
