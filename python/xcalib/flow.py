@@ -9,6 +9,7 @@ at ``p + flow[p]`` in the warped source; ``flow`` is ``(H, W, 2)`` float32 [px],
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Protocol
@@ -128,20 +129,28 @@ class NetworkFlow:
         Disagreement of the two directions at which confidence is 0 [px], > 0.
     num_threads
         0 uses every core.
+    providers
+        Short names of execution providers, the preferred first: ``("cuda", "cpu")``.
 
     Raises
     ------
     InputError
-        A file is not what it should be.
+        A file is not what it should be, or a provider is not there.
     """
 
-    def __init__(self, model: str | Path, tolerance: float = 2.0, num_threads: int = 0) -> None:
+    def __init__(
+        self,
+        model: str | Path,
+        tolerance: float = 2.0,
+        num_threads: int = 0,
+        providers: Sequence[str] = ("cpu",),
+    ) -> None:
         if not 0 < tolerance < np.inf:
             raise InputError(f"flow tolerance is {tolerance:g}, expected above 0 px")
         self.path = Path(model)
         self.tolerance = tolerance
         self.preparation = Preparation.read(self.path.with_suffix(".yaml"))
-        self._network = Network(self.path, num_threads=num_threads)
+        self._network = Network(self.path, providers, num_threads)
         inputs = self._network.inputs
         if len(inputs) != 2:
             names = ", ".join(item.name for item in inputs)
