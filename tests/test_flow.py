@@ -296,7 +296,8 @@ def test_raft_of_torchvision(tmp_path: Path) -> None:
     raft = models.raft_small(weights=None).eval()
     path = tmp_path / "raft.onnx"
     blank = torch.zeros(1, 3, 128, 160)
-    torch.onnx.export(raft, (blank, blank), str(path), input_names=["image1", "image2"])
+    # The graph of the newer exporter, torch 2.13's, is not the network: it answers otherwise.
+    torch.onnx.export(raft, (blank, blank), str(path), dynamo=False, opset_version=17)
     path.with_suffix(".yaml").write_text("range: [-1, 1]\n")
 
     gray = texture(160, 128)

@@ -820,12 +820,25 @@ def test_a_rig_corrects_the_estimated_offset(
         assert f"{refined.pairing.offset:+.4f} s" in refined.notes[-1]
 
 
+def test_a_rig_finds_clocks_that_agree_behind_a_wrong_estimate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    visible, thermal = pans(0.02)
+    monkeypatch.setattr("xcalib.footage.opening.open_stream", {"v": visible, "t": thermal}.get)
+    wrong = OffsetEstimate(1.1, True, 0.5, 0.2, 1.1)
+    monkeypatch.setattr("xcalib.footage.opening.estimate_offset", lambda *_: wrong)
+    refined = open_pairs("v", "t", Matching(time_offset=None)).refined(
+        IDENTITY, lambda _: PlaneDepth()
+    )
+    assert refined.pairing.offset == pytest.approx(0.02, abs=0.03)
+
+
 def test_a_rig_that_stands_still_tells_no_offset_by_registration() -> None:
     visible, thermal = pans(0.15, moves=False)
     candidates = offsets_around(0.1, visible, thermal)
     found = refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates)
     assert not found.told and found.offset == pytest.approx(0.1)
-    assert "change too little to tell" in found.line()
+    assert "change too little to confirm" in found.line()
 
 
 def test_frames_that_cannot_be_decoded_do_not_hinder_the_offset() -> None:

@@ -209,15 +209,15 @@ class RefinedOffset:
         )
         if self.told:
             return f"frames register best with the source late by {self.offset:+.4f} s ({figures})"
-        return f"registered frames change too little to tell it more closely ({figures})"
+        return f"registered frames change too little to confirm or refine it ({figures})"
 
 
 def offsets_around(guess: float, references: Stream, sources: Stream) -> list[float]:
-    """Candidates for `refine_offset`: 3 frames of the faster stream either way, in quarters [s]."""
+    """Candidates for `refine_offset`: 6 frames of the faster stream either way, in quarters [s]."""
     if references.times is None or sources.times is None:
         raise InputError(NO_TIMES)
     period = min(median_period(references.times), median_period(sources.times))
-    return [guess + period * quarters / 4 for quarters in range(-12, 13)]
+    return [guess + period * quarters / 4 for quarters in range(-24, 25)]
 
 
 def refine_offset(

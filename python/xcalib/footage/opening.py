@@ -24,7 +24,13 @@ from ..depth import (
 from ..depth.points import POINT_SUFFIXES
 from ..frames import Image, InputError, list_files
 from .depth_topic import TopicDepth, is_depth_topic
-from .offset import OffsetEstimate, estimate_offset, offsets_around, refine_offset
+from .offset import (
+    OffsetEstimate,
+    RefinedOffset,
+    estimate_offset,
+    offsets_around,
+    refine_offset,
+)
 from .pairing import Pairing, match_depth_stream, match_depths, pair_streams
 from .sources import open_stream
 from .stream import Picked, Stream
@@ -83,12 +89,31 @@ class Pairs:
         """Paired anew with the offset at which frames register best with the rig, `refine_offset`.
 
         ``open_depth`` gives the depth of the `references` of pairs. Without an estimated offset
-        the pairs stay as they are, and so they do where the registered frames do not tell.
+        the pairs stay as they are, and so they do where the registered frames tell neither around
+        the estimate nor around 0.
         """
         if self.estimate is None:
             return self
+        found = self._refined(self.estimate.peak, rig, open_depth)
+        if not found.told and self.estimate.offset:
+            # A peak elsewhere may be as high, and most clocks are meant to agree.
+            with contextlib.suppress(InputError):  # which do not overlap at all then
+                again = self._refined(0.0, rig, open_depth)
+                found = again if again.told else found
+        notes = [f"clock offset: {found.line()}"]
+        if self.estimate.trusted or not found.told:
+            notes.insert(0, self.notes[0])
+        pairing = self.pairing
+        if found.told:
+            streams = self.all_references, self.all_sources
+            pairing = pair_streams(*streams, "time", found.offset, self.matching.max_gap)
+        return replace(self, pairing=pairing, notes=(*notes, f"frames: {pairing.line()}"))
+
+    def _refined(
+        self, guess: float, rig: Rig, open_depth: Callable[[Pairs], DepthProvider]
+    ) -> RefinedOffset:
         streams = self.all_references, self.all_sources
-        candidates = offsets_around(self.estimate.peak, *streams)
+        candidates = offsets_around(guess, *streams)
         wide, depth = self, None
         if len(self.all_references) > len(self.all_sources):
             # The neighbours of a paired reference tell too, if there is depth of them.
@@ -99,14 +124,7 @@ class Pairs:
                 depth = open_depth(wide)
         if depth is None:
             wide, depth = self, open_depth(self)
-        found = refine_offset(rig, wide.references, self.all_sources, depth, candidates)
-        notes = [f"clock offset: {found.line()}"]
-        if self.estimate.trusted or not found.told:
-            notes.insert(0, self.notes[0])
-        pairing = self.pairing
-        if found.told:
-            pairing = pair_streams(*streams, "time", found.offset, self.matching.max_gap)
-        return replace(self, pairing=pairing, notes=(*notes, f"frames: {pairing.line()}"))
+        return refine_offset(rig, wide.references, self.all_sources, depth, candidates)
 
     def open_depth(
         self,
