@@ -841,6 +841,31 @@ def test_a_rig_that_stands_still_tells_no_offset_by_registration() -> None:
     assert "change too little to confirm" in found.line()
 
 
+@pytest.mark.parametrize("command", ["register", "evaluate", "calibrate"])
+def test_too_few_frames_tell_no_offset_and_every_command_says_so(
+    rendered: Path, tmp_path: Path, command: str
+) -> None:
+    for name in ("visible", "thermal"):
+        lines = [f"{p.name} {0.1 * i}\n" for i, p in enumerate(list_files(rendered / name))]
+        (tmp_path / f"{name}.txt").write_text("".join(lines))
+    rig, out = rendered / "rig.yaml", tmp_path / "out.yaml"
+    frames = (rendered / "visible", rendered / "thermal", "--depth", rendered / "depth")
+    times = [
+        f"--{k}-times={tmp_path / n}.txt"
+        for k, n in (("reference", "visible"), ("source", "thermal"))
+    ]
+    given = {
+        "register": (rig, *frames, "-o", tmp_path / "out"),
+        "evaluate": (rig, *frames),
+        "calibrate": (*frames, "--initial", rig, "-o", out, "--working-width", 160),
+    }[command]
+    result = run(command, *given, *times, "--time-offset", "auto")
+    assert result.exit_code == 0, result.output
+    assert "moves too little to tell a clock offset, 0 s is used" in result.stderr
+    assert "clock offset: too few frames overlap to confirm" in result.stderr
+    assert f"{FRAMES} pairs by time" in result.stderr
+
+
 def test_frames_that_cannot_be_decoded_do_not_hinder_the_offset() -> None:
     visible, thermal = pans(0.2)
     whole = thermal.read

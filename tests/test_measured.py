@@ -407,3 +407,30 @@ def test_commands_refuse_what_does_not_fit(
     assert "go with --depth stereo:FOLDER" in refused(*common, *given, *out)
     lidar = ("--depth", rendered / "depth", "--lidar-calibration", tmp_path / "no.yaml")
     assert "expected bin, pcd, ply files" in refused(*common, *lidar, *out).replace(".", "")
+    lidar = ("--depth", "plane", "--lidar-calibration", tmp_path / "no.yaml")
+    line = refused(*common, *lidar, *out)
+    assert "--lidar-calibration: --depth plane is no folder, expected one with scans" in line
+
+
+@pytest.mark.parametrize(
+    ("flag", "named"),
+    [
+        ("--complete", "--refine-plane fits the plane itself, which --complete would change"),
+        ("--depth-steady", "which --depth-steady would change"),
+        ("--depth=depth", "--refine-plane goes with --depth plane, not depth"),
+    ],
+)
+def test_refining_the_plane_refuses_what_it_does_not_go_with_at_once(
+    tmp_path: Path, refused: Callable[..., str], flag: str, named: str
+) -> None:
+    """Before anything is opened: the footage is not there."""
+    arguments = (
+        "nowhere",
+        "nowhere",
+        "--depth=plane",
+        flag,
+        "--refine-plane",
+        "-o",
+        tmp_path / "r",
+    )
+    assert named in refused("calibrate", *arguments)

@@ -289,6 +289,12 @@ def calibrate_command(
         raise click.UsageError(
             f"--refine-plane goes with --depth plane, not {inputs['depth_spec']}"
         )
+    for flag in ("--complete", "--depth-steady"):
+        if refine_plane and inputs[flag[2:].replace("-", "_")]:
+            raise click.UsageError(
+                f"--refine-plane fits the plane itself, which {flag} would change; expected only"
+                " one of them"
+            )
     calibration = CalibrationOptions(
         max_frames=max_frames,
         seed=seed,

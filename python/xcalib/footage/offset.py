@@ -199,10 +199,12 @@ class RefinedOffset:
     told: bool
     """Whether the frames register worse at both ends of the candidates."""
     scores: list[float]
-    """Mean NEC of the frames judged at each candidate."""
+    """Mean NEC of the frames judged, at each candidate; empty if fewer than two can be."""
 
     def line(self) -> str:
         """In one line."""
+        if not self.scores:
+            return "too few frames overlap to confirm or refine it by registration"
         figures = (
             f"NEC up to {max(self.scores):.3f}, at the ends of the offsets tried"
             f" {self.scores[0]:.3f} and {self.scores[-1]:.3f}"
@@ -251,7 +253,7 @@ def refine_offset(
     Raises
     ------
     InputError
-        Without candidates or times, or where no frame has a partner at every candidate.
+        Without candidates or times.
     """
     if not candidates:
         raise InputError("no candidate offsets, expected some")
@@ -260,13 +262,16 @@ def refine_offset(
     # A frame of the slower stream, and the pair it is in at each candidate.
     slower = int(len(references) > len(sources))
     pairs: list[dict[int, tuple[int, int]]] = []
+    # Wider than pairing itself: jitter must not take a frame's partner away between two others.
+    gap = 0.75 * max(median_period(references.times), median_period(sources.times)) or None
     for offset in candidates:
-        found = pair_times(references.times, sources.times, offset)
+        try:
+            found = pair_times(references.times, sources.times, offset, gap)
+        except InputError:
+            return RefinedOffset(float(candidates[len(candidates) // 2]), False, [])
         both = zip(found.references.tolist(), found.sources.tolist(), strict=True)
         pairs.append({pair[slower]: pair for pair in both})
     common = sorted(set.intersection(*(set(each) for each in pairs)))
-    if not common:
-        raise InputError("no frame has a partner at every candidate offset")
     spread = np.linspace(0, len(common) - 1, min(max_frames, len(common))).round().astype(int)
     judge = _Judge(rig, references, sources, depth)
     rows = []
@@ -302,8 +307,7 @@ def _chosen(candidates: Sequence[float], scores: Array) -> RefinedOffset:
     """The verdict on ``scores``, the NEC of each frame (N,) at each of the candidates."""
     middle = len(candidates) // 2
     if len(scores) < 2:
-        means = scores.mean(axis=0) if len(scores) else np.zeros(len(candidates))
-        return RefinedOffset(float(candidates[middle]), False, means.tolist())
+        return RefinedOffset(float(candidates[middle]), False, [])
     means = scores.mean(axis=0)
     lost = scores[:, [int(means.argmax())]] - scores
     error = lost.std(axis=0, ddof=1) / np.sqrt(len(scores))

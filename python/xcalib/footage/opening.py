@@ -97,9 +97,8 @@ class Pairs:
         found = self._refined(self.estimate.peak, rig, open_depth)
         if not found.told and self.estimate.offset:
             # A peak elsewhere may be as high, and most clocks are meant to agree.
-            with contextlib.suppress(InputError):  # which do not overlap at all then
-                again = self._refined(0.0, rig, open_depth)
-                found = again if again.told else found
+            again = self._refined(0.0, rig, open_depth)
+            found = again if again.told else found
         notes = [f"clock offset: {found.line()}"]
         if self.estimate.trusted or not found.told:
             notes.insert(0, self.notes[0])
@@ -117,10 +116,10 @@ class Pairs:
         wide, depth = self, None
         if len(self.all_references) > len(self.all_sources):
             # The neighbours of a paired reference tell too, if there is depth of them.
-            at_any = [pair_streams(*streams, "time", offset).references for offset in candidates]
-            every = np.unique(np.concatenate(at_any))
-            wide = replace(self, pairing=replace(self.pairing, references=every))
             with contextlib.suppress(InputError):
+                pairings = [pair_streams(*streams, "time", offset) for offset in candidates]
+                every = np.unique(np.concatenate([found.references for found in pairings]))
+                wide = replace(self, pairing=replace(self.pairing, references=every))
                 depth = open_depth(wide)
         if depth is None:
             wide, depth = self, open_depth(self)
