@@ -87,6 +87,15 @@ def test_a_frame_that_cannot_help_is_left_and_says_why(footage: list[Frame], kin
     assert kind in choice.candidates[5].reason
 
 
+def test_a_pixel_that_is_no_number_costs_its_frame_only(footage: list[Frame]) -> None:
+    """Dead pixels of a radiometric camera; the core takes finite pixels only."""
+    frames = [(ref, source.astype(np.float32) + 280, depth) for ref, source, depth in footage]
+    frames[5][1][7, 7] = np.nan
+    choice = choose(frames, 8)
+    assert choice.indices == [0, 1, 2, 3, 4, 6, 7]
+    assert choice.candidates[5].reason == "source has pixels that are not finite"
+
+
 def test_near_duplicates_come_last(footage: list[Frame]) -> None:
     random = np.random.default_rng(1)
     reference, source, depth = footage[0]
@@ -197,6 +206,8 @@ def test_python_names_what_cannot_be_chosen_from() -> None:
         xcalib.choose_frames([reference] * 2, [source] * 2, [depth])
     with pytest.raises(InputError, match="are 0, 0 frames, expected as many of each, at least 1"):
         xcalib.choose_frames([], [])
+    with pytest.raises(InputError, match=r"source 1 has shape \(9, 160\), expected \(120, 160\)"):
+        xcalib.choose_frames([reference] * 2, [source, source[:9]])
     with pytest.raises(InputError, match="max_frames is 0, expected at least 1"):
         xcalib.choose_frames([reference], [source], max_frames=0)
 

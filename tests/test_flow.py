@@ -279,7 +279,7 @@ def test_a_flow_network_runs_on_the_providers_named(
     names = ["CUDAExecutionProvider", "CPUExecutionProvider"]
     monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: names)
     with pytest.raises(InputError, match=r"provider CUDAExecutionProvider cannot be started"):
-        NetworkFlow(path, providers=("cuda", "cpu"))
+        NetworkFlow(path, providers="cuda, cpu")
     NetworkFlow(path)
     assert opened == [names, names[1:]]
     with pytest.raises(InputError, match="provider 'tpu' is not available, expected cuda, cpu"):

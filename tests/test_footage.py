@@ -235,6 +235,15 @@ def test_what_a_video_cannot_hold(tmp_path: Path, name: str, image: Image, probl
     assert not list(tmp_path.iterdir())
 
 
+def test_a_video_holds_frames_of_one_kind(tmp_path: Path) -> None:
+    """OpenCV leaves out frames of another kind without a word."""
+    mask = np.zeros((120, 160), np.uint8)
+    with VideoSink(tmp_path / "a.mkv", 10) as sink:
+        sink.write("", moving(1)[0], mask, None)
+        with pytest.raises(InputError, match=r"a frame is \(120, 160, 3, 'uint8'\), the first is"):
+            sink.write("", moving(1, channels=3)[0], mask, None)
+
+
 def test_a_video_is_whole_or_absent(tmp_path: Path) -> None:
     frames = moving(3, np.uint16)
     mask = np.full((120, 160), 2, np.uint8)
@@ -438,6 +447,22 @@ def test_a_folder_of_images_may_hold_metadata(tmp_path: Path) -> None:
     write_image(tmp_path / "1.png", moving(1)[0])
     (tmp_path / "metadata.yaml").write_text("camera: thermal\n")
     assert len(open_stream(tmp_path)) == 1
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite"])
+def test_a_bag_with_a_hole_is_named(tmp_path: Path, kind: str) -> None:
+    topics = {"/x": ("mono8", moving(20))}
+    bag = write_bag(tmp_path / ("b.bag" if kind == "ros1" else "b"), kind, topics)
+    file = Path(bag) if kind == "ros1" else next(Path(bag).glob("*.db3"))
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 3000] = bytes(3000)
+    whole = open_stream(f"{bag}#/x")
+    file.write_bytes(data)
+    with pytest.raises(InputError, match=r"#/x frame \d+: not readable, the bag is damaged: "):
+        open_stream(f"{bag}#/x")
+    if kind == "sqlite":  # the other keeps what it has read
+        with pytest.raises(DecodeError, match=r"#/x frame \d+: cannot decode the message"):
+            list(whole)
 
 
 def test_bad_bags(tmp_path: Path) -> None:

@@ -135,7 +135,8 @@ def choose_frames(
     Raises
     ------
     InputError
-        Sequences of different lengths, no frames, or ``max_frames`` below 1.
+        Sequences of different lengths, no frames, images of one camera that differ in size, or
+        ``max_frames`` below 1.
     """
     count = len(references)
     counts = [len(items) for items in (references, sources, depths) if items is not None]
@@ -147,8 +148,17 @@ def choose_frames(
     if max_frames < 1:
         raise InputError(f"max_frames is {max_frames}, expected at least 1")
 
+    shapes: list[tuple[int, ...]] = []
+
     def read(index: int) -> tuple[Image, Image, Floats | None]:
-        return references[index], sources[index], None if depths is None else depths[index]
+        images = references[index], sources[index]
+        for name, image, first in zip(("reference", "source"), images, shapes, strict=False):
+            if image.shape[:2] != first:
+                raise InputError(
+                    f"{name} {index} has shape {image.shape}, expected {first} as those before it"
+                )
+        shapes[:] = [image.shape[:2] for image in images]
+        return *images, None if depths is None else depths[index]
 
     return choose_informed(count, max_frames, seed, read)
 
@@ -197,11 +207,17 @@ def _candidate(index: int, read: Read) -> Candidate:
         reference, source, depth = read(index)
     except DecodeError as error:
         return Candidate(index, str(error))
-    dark = gray(reference)
+    dark, heat = gray(reference), gray(source)
+    broken = [
+        f"{name} has pixels that are not finite"
+        for name, image in (("reference", dark), ("source", heat))
+        if not np.isfinite(image).all()
+    ]
+    dark, heat = (np.nan_to_num(image, posinf=0, neginf=0) for image in (dark, heat))
     if reference.dtype != np.float32:
         # As the objective does, for the edges of a night image lie in its darkest tenth.
         dark = np.log1p(20 * dark).astype(np.float32)
-    first, second = _small(dark), _small(gray(source))
+    first, second = _small(dark), _small(heat)
     found = Candidate(
         index,
         edges=(_contrast(first), _contrast(second)),
@@ -215,6 +231,7 @@ def _candidate(index: int, read: Read) -> Candidate:
     for name, image, ends in (("reference", reference, "top"), ("source", source, "both")):
         if _share_at_end(image, ends) > SATURATED:
             found.reason = f"{name} is saturated"
+    found.reason = broken[0] if broken else found.reason
     return found
 
 

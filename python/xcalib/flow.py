@@ -130,7 +130,7 @@ class NetworkFlow:
     num_threads
         0 uses every core.
     providers
-        Short names of execution providers, the preferred first: ``("cuda", "cpu")``.
+        Short names of execution providers, the preferred first: ``"cuda,cpu"``.
 
     Raises
     ------
@@ -143,7 +143,7 @@ class NetworkFlow:
         model: str | Path,
         tolerance: float = 2.0,
         num_threads: int = 0,
-        providers: Sequence[str] = ("cpu",),
+        providers: str | Sequence[str] = "cpu",
     ) -> None:
         if not 0 < tolerance < np.inf:
             raise InputError(f"flow tolerance is {tolerance:g}, expected above 0 px")

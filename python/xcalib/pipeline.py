@@ -92,7 +92,7 @@ class Frames:
             depth_focal,
             inverse_scale,
             inverse_shift,
-            tuple(name.strip() for name in providers.split(",")),
+            providers,
             threads,
         )
         given = depth_scale, plane, network, MeasuredDepth(**measured)

@@ -66,9 +66,15 @@ class BagImages(Stream):
         self._connections = [c for c in self._bag.connections if c.topic == self.topic]
         self._logged: list[int] = []
         stamps: list[int] = []
-        for _, logged, data in self._bag.messages(self._connections):
-            self._logged.append(logged)
-            stamps.append(self._stamp(data, len(stamps)))
+        try:
+            for _, logged, data in self._bag.messages(self._connections):
+                self._logged.append(logged)
+                stamps.append(self._stamp(data, len(stamps)))
+        except InputError:
+            raise
+        except Exception as error:  # each storage of rosbags has errors of its own
+            where = self.where(len(stamps))
+            raise InputError(f"{where}: not readable, the bag is damaged: {error}") from None
         if not stamps:
             raise InputError(f"{path}#{self.topic}: no message, expected images")
         for nanoseconds in (stamps, self._logged):
@@ -93,15 +99,16 @@ class BagImages(Stream):
         return len(self._logged)
 
     def read(self, index: int) -> Image:
-        if index != self._next:
-            # Messages of one time of recording come in the order of the bag.
-            logged = self._logged[index]
-            self._messages = self._bag.messages(self._connections, start=logged)
-            for _ in range(index - self._logged.index(logged)):
-                next(self._messages)
-        connection, _, data = next(self._messages)
-        self._next = index + 1
         try:
+            if index != self._next:
+                # Messages of one time of recording come in the order of the bag.
+                logged = self._logged[index]
+                self._messages = self._bag.messages(self._connections, start=logged)
+                for _ in range(index - self._logged.index(logged)):
+                    next(self._messages)
+            self._next = -1  # nowhere known, unless this message comes
+            connection, _, data = next(self._messages)
+            self._next = index + 1
             message: Any = self._bag.deserialize(data, connection.msgtype)
         except Exception as error:  # numpy's, struct's and rosbags' own
             raise DecodeError(f"{self.where(index)}: cannot decode the message: {error}") from None

@@ -92,8 +92,10 @@ def estimate_offset(
         return OffsetEstimate(0.0, False, 0.0, 0.0, 0.0)
     periods = median_period(references.times[own]), median_period(sources.times[other])
     step = max(periods) / 2
-    first = _resampled(*_edge_motion(references, own), step)
-    second = _resampled(*_edge_motion(sources, other), step)
+    motions = _edge_motion(references, own), _edge_motion(sources, other)
+    if min(len(times) for times, _ in motions) < 15:
+        return OffsetEstimate(0.0, False, 0.0, 0.0, 0.0)
+    first, second = (_resampled(*motion, step) for motion in motions)
     return _peak(first, second, step, min(max_offset, (end - begin) / 3))
 
 
