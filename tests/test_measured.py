@@ -145,14 +145,14 @@ def test_both_ways_of_a_pose_agree_and_sizes_scale(tmp_path: Path) -> None:
     ("text", "problem"),
     [
         ("intrinsics: [1, 1, 1, 1]", "camera_from_lidar is missing"),
-        (YAML.format(pose=QUARTER_TURN) + "extra: 1", "extra is unknown"),
+        (YAML.format(pose=QUARTER_TURN) + "extra: 1", "unknown key 'extra'"),
         (YAML.format(pose=[[1, 0, 0, 0]] * 3), "no rotation"),
         (YAML.format(pose=[[1, 0], [0, 1]]), "expected 3x4 numbers"),
         (YAML.format(pose="{quaternion_wxyz: [1, 0, 0, 1]}"), "quaternion_wxyz and translation_m"),
         (YAML.format(pose="{quaternion_wxyz: [1, 1, 0, 0], translation_m: [0, 0, 0]}"), "unit len"),
         (YAML.format(pose=QUARTER_TURN).replace("[100, ", "[-100, "), "expected above 0"),
         ("[", "not YAML"),
-        ("just words", "expected a mapping"),
+        ("just words", "expected keys and values"),
     ],
 )
 def test_bad_lidar_calibrations_are_named(tmp_path: Path, text: str, problem: str) -> None:

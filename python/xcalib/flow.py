@@ -16,12 +16,12 @@ from typing import Any, Protocol
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from ._core import FlowOptions, patch_flow
 from .frames import Image, InputError, gray, size_of
 from .onnx import Network
+from .yaml_file import load_yaml
 
 __all__ = ["Flow", "FlowOptions", "FlowProvider", "NetworkFlow", "PatchFlow", "patch_flow"]
 
@@ -78,16 +78,7 @@ class Preparation:
         """Read the file; without one the defaults hold, which are RAFT's before its own scaling."""
         if not path.is_file():
             return Preparation()
-        try:
-            document = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
-        if not isinstance(document, dict):
-            raise InputError(f"{path}: expected keys and values, one a line")
-        names = [item.name for item in fields(Preparation)]
-        for key in document:
-            if key not in names:
-                raise InputError(f"{path}: unknown key {key!r}, expected {', '.join(names)}")
+        document = load_yaml(path, optional=[item.name for item in fields(Preparation)])
         values: dict[str, Any] = {}
         for key, value in document.items():
             if key == "flow_from":
