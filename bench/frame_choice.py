@@ -14,7 +14,7 @@ import numpy as np
 from common import data, machine
 
 import xcalib
-from xcalib.choose import choose_informed
+from xcalib.choose import choose_informed, draw_frames
 from xcalib.depth import FolderDepth
 from xcalib.evaluate import evaluate
 from xcalib.footage import ImageFiles
@@ -53,7 +53,7 @@ def main() -> None:
         found: dict[str, list[tuple[int, ...]]] = {"spread": [], "informed": []}
         for seed in range(args.seeds):
             footage = sorted(random.Random(seed).sample(fit, args.footage))
-            spread = xcalib.choose_frames(len(footage), chosen, seed)
+            spread = draw_frames(len(footage), chosen, seed)
             choice = choose_informed(len(footage), chosen, seed, lambda i, f=footage: read(f[i]))
             for name, indices in (("spread", spread), ("informed", choice.indices)):
                 found[name].append(tuple(footage[i] for i in indices))

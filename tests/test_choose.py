@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import weakref
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
@@ -10,9 +12,12 @@ import numpy as np
 import pytest
 from click.testing import Result
 
+import xcalib
 from conftest import run
 from xcalib.choose import CANDIDATES, Choice, choose_informed
-from xcalib.frames import DecodeError, Image, list_files, read_image, write_image
+from xcalib.depth import read_depth
+from xcalib.footage import open_stream
+from xcalib.frames import DecodeError, Image, InputError, list_files, read_image, write_image
 
 Frame = tuple[Image, Image, np.ndarray]
 
@@ -82,6 +87,15 @@ def test_a_frame_that_cannot_help_is_left_and_says_why(footage: list[Frame], kin
     assert kind in choice.candidates[5].reason
 
 
+def test_a_pixel_that_is_no_number_costs_its_frame_only(footage: list[Frame]) -> None:
+    """Dead pixels of a radiometric camera; the core takes finite pixels only."""
+    frames = [(ref, source.astype(np.float32) + 280, depth) for ref, source, depth in footage]
+    frames[5][1][7, 7] = np.nan
+    choice = choose(frames, 8)
+    assert choice.indices == [0, 1, 2, 3, 4, 6, 7]
+    assert choice.candidates[5].reason == "source has pixels that are not finite"
+
+
 def test_near_duplicates_come_last(footage: list[Frame]) -> None:
     random = np.random.default_rng(1)
     reference, source, depth = footage[0]
@@ -141,10 +155,67 @@ def test_unknown_depth_is_no_obstacle(footage: list[Frame]) -> None:
     assert len(choice.indices) == 4
 
 
+# -- In Python ------------------------------------------------------------------------------------
+
+
+def test_python_chooses_as_the_command_does(scene: Path) -> None:
+    """The example of docs/inputs_frames.md, on streams whose images are read when asked for."""
+    cut(list_files(scene / "thermal")[4])
+    result = calibrate(scene, "--frames", 3, "--report", scene / "report.json")
+    assert result.exit_code in (0, 3), result.output
+    files = json.loads((scene / "report.json").read_text())["files"]
+
+    visible, thermal = open_stream(scene / "visible"), open_stream(scene / "thermal")
+    depths = [read_depth(path) for path in list_files(scene / "depth")]
+    choice = xcalib.choose_frames(visible, thermal, depths, max_frames=3)
+    chosen = choice.indices
+    assert [visible.where(i) for i in chosen] == files
+    assert [candidate.index for candidate in choice.unusable] == [4]
+    given = ([images[i] for i in chosen] for images in (visible, thermal, depths))
+    options = xcalib.CalibrationOptions(max_frames=3, working_width=160)
+    rig = xcalib.calibrate(*given, options=options).rig
+    np.testing.assert_allclose(rig.t, xcalib.Rig.load(scene / "rig.yaml").t, atol=1e-6)
+
+
+def test_python_reads_each_image_once_and_keeps_none() -> None:
+    frames = [frame(seed) for seed in range(6)]
+    alive: list[weakref.ref[Image]] = []
+
+    class Images(Sequence[Image]):
+        def __init__(self, kind: int) -> None:
+            self.kind, self.asked = kind, []
+
+        def __len__(self) -> int:
+            return 6
+
+        def __getitem__(self, index: int) -> Image:
+            self.asked.append(index)
+            assert sum(image() is not None for image in alive) <= 3
+            image = frames[index][self.kind].copy()
+            alive.append(weakref.ref(image))
+            return image
+
+    streams = [Images(kind) for kind in range(3)]
+    assert len(xcalib.choose_frames(*streams, max_frames=2).indices) == 2
+    assert all(stream.asked == list(range(6)) for stream in streams)
+
+
+def test_python_names_what_cannot_be_chosen_from() -> None:
+    reference, source, depth = frame(0)
+    with pytest.raises(InputError, match="depths are 2, 2, 1 frames, expected as many of each"):
+        xcalib.choose_frames([reference] * 2, [source] * 2, [depth])
+    with pytest.raises(InputError, match="are 0, 0 frames, expected as many of each, at least 1"):
+        xcalib.choose_frames([], [])
+    with pytest.raises(InputError, match=r"source 1 has shape \(9, 160\), expected \(120, 160\)"):
+        xcalib.choose_frames([reference] * 2, [source, source[:9]])
+    with pytest.raises(InputError, match="max_frames is 0, expected at least 1"):
+        xcalib.choose_frames([reference], [source], max_frames=0)
+
+
 # -- The command ---------------------------------------------------------------------------------
 
 
-def calibrate(scene: Path, *more: str | int) -> Result:
+def calibrate(scene: Path, *more: str | int | Path) -> Result:
     return run(
         *("calibrate", scene / "visible", scene / "thermal", "--depth", scene / "depth"),
         *("-o", scene / "rig.yaml", "--working-width", 160, *more),

@@ -261,3 +261,57 @@ def test_networks_of_another_kind_are_refused(build: Build, tmp_path: Path) -> N
         NetworkFlow(no_flow)(image, image[:, :10], None)
     with pytest.raises(InputError, match="flow tolerance is 0, expected above 0 px"):
         NetworkFlow(no_flow, tolerance=0)
+
+
+def test_a_flow_network_runs_on_the_providers_named(
+    build: Build, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import onnxruntime
+
+    path, opened = build(DIFFERENCE, ["flow"], SLICE), []
+    session = onnxruntime.InferenceSession
+
+    def watched(*arguments: Any, providers: list[str]) -> Any:
+        opened.append(providers)
+        return session(*arguments, providers=["CPUExecutionProvider"])
+
+    monkeypatch.setattr(onnxruntime, "InferenceSession", watched)
+    names = ["CUDAExecutionProvider", "CPUExecutionProvider"]
+    monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: names)
+    with pytest.raises(InputError, match=r"provider CUDAExecutionProvider cannot be started"):
+        NetworkFlow(path, providers="cuda, cpu")
+    NetworkFlow(path)
+    assert opened == [names, names[1:]]
+    with pytest.raises(InputError, match="provider 'tpu' is not available, expected cuda, cpu"):
+        NetworkFlow(path, providers=("tpu",))
+
+
+def test_raft_of_torchvision(tmp_path: Path) -> None:
+    """RAFT with random weights, exported: twelve outputs, the last as PyTorch computes it."""
+    torch = pytest.importorskip("torch", reason="needs the extra test-networks")
+    models = pytest.importorskip(
+        "torchvision.models.optical_flow", reason="needs the extra test-networks"
+    )
+    torch.manual_seed(0)
+    raft = models.raft_small(weights=None).eval()
+    path = tmp_path / "raft.onnx"
+    blank = torch.zeros(1, 3, 128, 160)
+    # The graph of the newer exporter, torch 2.13's, is not the network: it answers otherwise.
+    torch.onnx.export(raft, (blank, blank), str(path), dynamo=False, opset_version=17)
+    path.with_suffix(".yaml").write_text("range: [-1, 1]\n")
+
+    gray = texture(160, 128)
+    reference = np.dstack([gray, gray // 2, 255 - gray])
+    warped = np.dstack([np.roll(gray, 3, axis=1), gray, gray // 3])
+    network = NetworkFlow(path)
+    flow, confidence = network(reference, warped, None)
+    assert len(network._network.outputs) == 12
+
+    def pixels(image: Image) -> Any:
+        return torch.from_numpy(image[..., ::-1].transpose(2, 0, 1)[None] / np.float32(127.5) - 1)
+
+    with torch.no_grad():
+        expected = raft(pixels(reference), pixels(warped))[-1][0].numpy().transpose(1, 2, 0)
+    np.testing.assert_allclose(flow, expected, rtol=1e-3, atol=1e-3 * np.abs(expected).max())
+    assert np.ptp(expected) > 0.01  # it answers to its images
+    assert confidence.shape == (128, 160)

@@ -14,12 +14,17 @@ import pytest
 
 from conftest import FRAMES, run
 from xcalib import Pinhole, Rig, synthetic
-from xcalib.depth import read_depth
+from xcalib.depth import FolderDepth, PlaneDepth, read_depth
 from xcalib.footage import (
+    Matching,
+    OffsetEstimate,
+    Pairing,
+    Pairs,
     Stream,
     camera_infos,
     estimate_offset,
     match_depths,
+    offsets_around,
     open_pairs,
     open_stream,
     pair_streams,
@@ -28,7 +33,7 @@ from xcalib.footage import (
     refine_offset,
 )
 from xcalib.footage.writer import VideoSink
-from xcalib.frames import Image, InputError, list_files, read_image, write_image
+from xcalib.frames import DecodeError, Image, InputError, list_files, read_image, write_image
 
 Refused = Callable[..., str]
 
@@ -190,6 +195,16 @@ def test_a_seek_that_leads_astray_is_not_believed(
         np.testing.assert_array_equal(video[index], frames[index])
 
 
+def test_h264() -> None:
+    """Thirty frames with B-frames between; each is lighter than the last by 6 levels."""
+    video = open_stream(Path(__file__).parent / "data" / "h264.mp4")
+    assert len(video) == 30
+    np.testing.assert_allclose(video.times, np.arange(30) / 20, atol=2e-3)
+    assert video[0].shape == (48, 64, 3)
+    for index in (*range(30), 29, 2, 17, 0):
+        assert np.median(video[index]) == pytest.approx(30 + 6 * index, abs=4)
+
+
 def test_halves(tmp_path: Path) -> None:
     frames = moving(3)
     path = write_video(tmp_path / "w.mkv", frames, "FFV1")
@@ -220,6 +235,15 @@ def test_what_a_video_cannot_hold(tmp_path: Path, name: str, image: Image, probl
     assert not list(tmp_path.iterdir())
 
 
+def test_a_video_holds_frames_of_one_kind(tmp_path: Path) -> None:
+    """OpenCV leaves out frames of another kind without a word."""
+    mask = np.zeros((120, 160), np.uint8)
+    with VideoSink(tmp_path / "a.mkv", 10) as sink:
+        sink.write("", moving(1)[0], mask, None)
+        with pytest.raises(InputError, match=r"a frame is \(120, 160, 3, 'uint8'\), the first is"):
+            sink.write("", moving(1, channels=3)[0], mask, None)
+
+
 def test_a_video_is_whole_or_absent(tmp_path: Path) -> None:
     frames = moving(3, np.uint16)
     mask = np.full((120, 160), 2, np.uint8)
@@ -242,7 +266,10 @@ def encoded(image: Image, encoding: str) -> Image:
 
 
 def write_bag(path: Path, kind: str, topics: dict[str, tuple[str, list[Image]]]) -> str:
-    """A bag with topics of (encoding, images), 0.1 s apart, and a camera_info; what to open."""
+    """A bag with topics of (encoding, images), 0.1 s apart, and a camera_info; what to open.
+
+    Compressed: ``png``, or ``KIND; CODEC`` with the bytes themselves for images.
+    """
     pytest.importorskip("rosbags")
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
@@ -263,13 +290,14 @@ def write_bag(path: Path, kind: str, topics: dict[str, tuple[str, list[Image]]])
         writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
     with writer:
         for number, (topic, (encoding, images)) in enumerate(topics.items()):
-            name = "sensor_msgs/msg/" + ("CompressedImage" if encoding == "png" else "Image")
+            compressed = encoding == "png" or ";" in encoding
+            name = "sensor_msgs/msg/" + ("CompressedImage" if compressed else "Image")
             connection = writer.add_connection(topic, name, typestore=store)
             for index, image in enumerate(images):
                 stamp = 1_700_000_000_000_000_000 + index * 100_000_000 + number * 10_000_000
-                if encoding == "png":
-                    data = cv2.imencode(".png", image)[1].ravel()
-                    message = types[name](header(stamp), "png", data)
+                if compressed:
+                    data = cv2.imencode(".png", image)[1].ravel() if encoding == "png" else image
+                    message = types[name](header(stamp), encoding, data)
                 else:
                     pixels = np.ascontiguousarray(encoded(image, encoding))
                     height, width = image.shape[:2]
@@ -314,6 +342,101 @@ def test_bags(tmp_path: Path, kind: str) -> None:
     assert "FX,FY,CX,CY 300,301,160,120 px" in result.stdout
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
+def test_bayer(tmp_path: Path, pattern: str, dtype: type) -> None:
+    (colour,) = moving(1, dtype, channels=3)
+    y, x = np.mgrid[:120, :160]
+    channel = np.array(["bgr".index(letter) for letter in pattern])[y % 2 * 2 + x % 2]
+    mosaic = np.take_along_axis(colour, channel[..., None], axis=2)[..., 0]
+    encoding = f"bayer_{pattern}{8 * np.dtype(dtype).itemsize}"
+    stream = open_stream(write_bag(tmp_path / "b", "sqlite", {"/raw": (encoding, [mosaic])}))
+    assert stream[0].dtype == dtype
+    error = np.abs(stream[0].astype(int) - colour.astype(int))[2:-2, 2:-2]
+    assert error.max() < 0.03 * np.iinfo(dtype).max
+
+
+def compressed_depth(values: Image, scale: float = 0, shift: float = 0) -> Image:
+    """As image_transport's compressed_depth writes it: a header of 12 bytes, and a PNG."""
+    header = np.array([scale, shift], "<f4").view(np.uint8)
+    png = cv2.imencode(".png", values)[1].ravel()
+    return np.concatenate([np.zeros(4, np.uint8), header, png])
+
+
+def test_compressed_depth(tmp_path: Path) -> None:
+    millimetres = np.arange(0, 60000, 50, np.uint16).reshape(30, 40)
+    metres = (millimetres * np.float32(1e-3)).clip(0, 10)
+    # As compressed_depth_image_transport quantizes: nearer is finer, 0 is unknown.
+    shift = 1 - 100.0 * (100.0 + 1) / 10
+    scale = 100.0 * (100.0 + 1)
+    with np.errstate(divide="ignore"):
+        codes = np.where(metres > 0, np.clip(scale / metres + shift, 0, 65535), 0)
+    topics = {
+        "/mm": ("16UC1; compressedDepth png", [compressed_depth(millimetres)]),
+        "/m": (
+            "32FC1; compressedDepth",
+            [compressed_depth(codes.astype(np.uint16), scale, shift)],
+        ),
+        "/rvl": ("16UC1; compressedDepth rvl", [np.zeros(40, np.uint8)]),
+    }
+    bag = write_bag(tmp_path / "b", "mcap", topics)
+    np.testing.assert_array_equal(open_stream(f"{bag}#/mm")[0], millimetres)
+    found = open_stream(f"{bag}#/m")[0]
+    assert found.dtype == np.float32
+    told = metres > 0.2  # codes end at 65535
+    np.testing.assert_allclose(found[told], metres[told], rtol=0.002)
+    assert found[0, 0] == 0
+    with pytest.raises(DecodeError, match=r"frame 0: cannot decode 28 bytes, .* rvl"):
+        open_stream(f"{bag}#/rvl")[0]
+
+
+@pytest.mark.parametrize("kind", ["16UC1", "32FC1", "16UC1; compressedDepth"])
+def test_depth_from_a_topic(rendered: Path, tmp_path: Path, kind: str) -> None:
+    names = "visible", "thermal", "depth"
+    files = [list_files(rendered / name) for name in names]
+    visible, thermal = ([read_image(path) for path in paths] for paths in files[:2])
+    metres = [read_depth(path) for path in files[2]]
+    depth = metres
+    if kind != "32FC1":
+        depth = [np.where(m < 65, 1e3 * m, 0).round().astype(np.uint16) for m in metres]
+    if ";" in kind:
+        depth = [compressed_depth(values) for values in depth]
+    topics = {"/v": ("bgr8", visible), "/t": ("mono8", thermal), "/depth": (kind, depth)}
+    bag = write_bag(tmp_path / "drive.bag", "ros1", topics)
+    rig, out = rendered / "rig.yaml", tmp_path / "out"
+    frames = (f"{bag}#/v", f"{bag}#/t", "--depth", f"{bag}#/depth")
+    result = run("register", rig, *frames, "-o", out)
+    assert result.exit_code == 0, result.output
+    inputs = (rendered / "visible", rendered / "thermal", "--depth", rendered / "depth")
+    assert run("register", rig, *inputs, "-o", tmp_path / "true").exit_code == 0
+    for found, true in zip(list_files(out), list_files(tmp_path / "true"), strict=True):
+        error = np.abs(read_image(found).astype(int) - read_image(true).astype(int))
+        assert np.percentile(error[read_image(out / "masks" / found.name) == 0], 99) <= 2
+
+
+def test_depth_topics_are_matched_by_time_or_in_order(tmp_path: Path) -> None:
+    metres = [np.full((30, 40), 1 + i, np.float32) for i in range(6)]
+    bag = write_bag(tmp_path / "b", "sqlite", {"/depth": ("32FC1", metres)})
+    stamps = 1_700_000_000.0 + 0.1 * np.arange(6)
+    image = np.zeros((60, 80), np.uint8)
+    for times, used, expected in (
+        (stamps[[1, 4]] + 0.02, [0, 1], [2, 5]),
+        (None, [0, 2, 3], [1, 3, 4]),
+    ):
+        references = Listed([image] * (6 if times is None else 2), times)
+        pairing = Pairing("order", np.array(used), np.array(used))
+        depth = Pairs(references, references, pairing, ()).open_depth(f"{bag}#/depth")
+        assert [depth(i, image).mean() for i in range(len(used))] == expected
+    pairs = Pairs(*[Listed([image] * 4)] * 2, Pairing("order", np.arange(3), np.arange(3)), ())
+    with pytest.raises(InputError, match="first of 6 depth maps, memory frame 0 of 4 reference"):
+        pairs.open_depth(f"{bag}#/depth")
+    with pytest.raises(InputError, match="depth is 40x30, but the reference image is 80x80"):
+        depth(0, np.zeros((80, 80), np.uint8))
+    grey = write_bag(tmp_path / "c", "sqlite", {"/grey": ("mono8", [image] * 4)})
+    with pytest.raises(InputError, match="depth is 60x80 uint8, expected 32FC1 in metres or 16UC1"):
+        Pairs(*[Listed([image] * 4)] * 2, pairing, ()).open_depth(grey)(0, image)
+
+
 def test_bags_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     with pytest.raises(InputError, match=r"a\.mcap: bags need .* install xcalib-rgbt\[ros\]"):
@@ -326,6 +449,22 @@ def test_a_folder_of_images_may_hold_metadata(tmp_path: Path) -> None:
     assert len(open_stream(tmp_path)) == 1
 
 
+@pytest.mark.parametrize("kind", ["ros1", "sqlite"])
+def test_a_bag_with_a_hole_is_named(tmp_path: Path, kind: str) -> None:
+    topics = {"/x": ("mono8", moving(20))}
+    bag = write_bag(tmp_path / ("b.bag" if kind == "ros1" else "b"), kind, topics)
+    file = Path(bag) if kind == "ros1" else next(Path(bag).glob("*.db3"))
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 3000] = bytes(3000)
+    whole = open_stream(f"{bag}#/x")
+    file.write_bytes(data)
+    with pytest.raises(InputError, match=r"#/x frame \d+: not readable, the bag is damaged: "):
+        open_stream(f"{bag}#/x")
+    if kind == "sqlite":  # the other keeps what it has read
+        with pytest.raises(DecodeError, match=r"#/x frame \d+: cannot decode the message"):
+            list(whole)
+
+
 def test_bad_bags(tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
     (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
@@ -336,6 +475,66 @@ def test_bad_bags(tmp_path: Path) -> None:
     stream = open_stream(write_bag(tmp_path / "b.bag", "ros1", {"/x": ("strange", moving(1))}))
     with pytest.raises(InputError, match="encoding is 'strange', expected one of mono8"):
         stream[0]
+
+
+def test_frames_that_cannot_be_decoded_are_told_from_wrong_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What `calibrate` may leave out: a page, a frame of a video, a message."""
+    frames = moving(4, np.uint16)
+    cv2.imwritemulti(str(tmp_path / "s.tiff"), frames)
+    pages = open_stream(tmp_path / "s.tiff")
+    data = bytearray((tmp_path / "s.tiff").read_bytes())
+    data[8:2000] = bytes(1992)  # pixels of the first page
+    (tmp_path / "s.tiff").write_bytes(data)
+    with pytest.raises(DecodeError, match=r"s\.tiff page 0: cannot decode"):
+        pages[0]
+    np.testing.assert_array_equal(pages[3], frames[3])
+
+    topics = {"/png": ("png", frames), "/jpg": ("bgr8; jpeg compressed bgr8", [])}
+    jpeg = cv2.imencode(".jpg", moving(1)[0])[1].ravel()
+    topics["/jpg"][1].extend([jpeg, jpeg[: len(jpeg) // 2], np.zeros(0, np.uint8), jpeg])
+    stream = open_stream(write_bag(tmp_path / "b", "sqlite", topics) + "#/jpg")
+    for index in (1, 2):
+        with pytest.raises(DecodeError, match=f"frame {index}: cannot decode .* bytes"):
+            stream[index]
+    assert stream[3].shape == (120, 160)
+
+    video = open_stream(write_video(tmp_path / "v.mkv", moving(90), "FFV1"))
+    video[0]
+    capture = video._capture  # type: ignore[attr-defined]
+
+    class Broken:
+        def __getattr__(self, name: str) -> Any:
+            return getattr(capture, name)
+
+        def grab(self) -> bool:
+            return False
+
+    monkeypatch.setattr(video, "_capture", Broken())
+    with pytest.raises(DecodeError, match=r"v\.mkv frame 1: cannot decode"):
+        video[1]
+    monkeypatch.setattr(video, "_capture", capture)
+    for index in (2, 70):
+        np.testing.assert_array_equal(video[index], moving(90)[index])
+
+
+def test_calibrate_leaves_out_messages_that_cannot_be_decoded(
+    rendered: Path, tmp_path: Path
+) -> None:
+    visible, thermal = (
+        [cv2.imencode(".png", read_image(path))[1].ravel() for path in list_files(rendered / name)]
+        for name in ("visible", "thermal")
+    )
+    thermal[2] = thermal[2][: len(thermal[2]) // 2]
+    kind = "bgr8; png compressed bgr8"
+    bag = write_bag(tmp_path / "b", "mcap", {"/v": (kind, visible), "/t": (kind, thermal)})
+    frames = (f"{bag}#/v", f"{bag}#/t", "--depth", rendered / "depth", "--working-width", 160)
+    for choose in ("informed", "spread"):
+        result = run("calibrate", *frames, "--choose", choose, "-o", tmp_path / "rig.yaml")
+        assert result.exit_code in (0, 3), result.output
+        assert "1 unusable frame is left out;" in result.stderr
+        assert "#/t frame 2: cannot decode" in result.stderr
 
 
 # -- Pairing
@@ -429,6 +628,9 @@ def textured(seed: int) -> Image:
 
 VISIBLE = textured(0)
 THERMAL = 255 - np.abs(VISIBLE * 1.7 % 510 - 255)
+CAMERA = Pinhole(240, 160, 200, 200, 119.5, 79.5)
+IDENTITY = Rig(CAMERA, CAMERA)
+"""The rig of two `pans`."""
 
 
 class Pan(Stream):
@@ -499,12 +701,12 @@ def test_offset_is_refined_by_registration(rendered: Path) -> None:
     rig = Rig.load(rendered / "rig.yaml")
     visible, thermal = open_stream(rendered / "visible"), open_stream(rendered / "thermal")
     visible.times, thermal.times = np.arange(FRAMES) * 0.5, np.arange(FRAMES) * 0.5 + 0.5
-    depths = list_files(rendered / "depth")
-    best, scores = refine_offset(
-        rig, visible, thermal, lambda index, _: read_depth(depths[index]), [0, 0.5, 1.0], 3
-    )
-    assert best == 0.5
-    assert scores[1] > max(scores[0], scores[2])
+    provider = FolderDepth(rendered / "depth", list_files(rendered / "visible"))
+    found = refine_offset(rig, visible, thermal, provider, [0, 0.5, 1.0], 3)
+    assert found.told and found.offset == 0.5
+    assert found.scores[1] > max(found.scores[0], found.scores[2])
+    # The guess, in the middle, is a frame off.
+    assert refine_offset(rig, visible, thermal, provider, [0, 0.5, 1.0, 1.5], 3).offset == 0.5
 
 
 # -- The commands
@@ -609,17 +811,99 @@ def test_register_estimates_how_late_the_source_is(tmp_path: Path) -> None:
     v, t = (
         write_video(tmp_path / f"{name}.mkv", list(pan), "FFV1", 30) for name, pan in scenes.items()
     )
-    camera = Pinhole(240, 160, 200, 200, 119.5, 79.5)
-    Rig(camera, camera).save(tmp_path / "rig.yaml")
+    IDENTITY.save(tmp_path / "rig.yaml")
     arguments = ("register", tmp_path / "rig.yaml", v, t, "--depth", "plane")
     result = run(*arguments, "--time-offset", "auto", "-o", tmp_path / "out.mkv")
     assert result.exit_code == 0, result.output
     found = re.search(r"clock offset: source late by ([+0-9.]+) s", result.stderr)
     assert found and float(found[1]) == pytest.approx(1 / 3, abs=0.008)
+    refined = re.search(r"register best with the source late by ([+0-9.]+) s", result.stderr)
+    assert refined and float(refined[1]) == pytest.approx(1 / 3, abs=0.02)
     assert "140 pairs by time" in result.stderr
     assert "10 reference, 10 source frames" in result.stderr
     # The rig is the identity: what is registered first is the source's eleventh frame.
     np.testing.assert_array_equal(open_stream(tmp_path / "out.mkv")[0], open_stream(t)[10])
+
+
+@pytest.mark.parametrize(("late", "rate"), [(1 / 3, 30), (0.15, 9)])
+def test_a_rig_corrects_the_estimated_offset(
+    monkeypatch: pytest.MonkeyPatch, late: float, rate: float
+) -> None:
+    """Two frames off, trusted or not: registration leads back; without motion it says so."""
+    visible, thermal = pans(late, rate)
+    monkeypatch.setattr("xcalib.footage.opening.open_stream", {"v": visible, "t": thermal}.get)
+    for trusted in (True, False):
+        peak = late + 2 / 30
+        wrong = OffsetEstimate(peak * trusted, trusted, 0.5 * trusted, 0.2, peak)
+        monkeypatch.setattr("xcalib.footage.opening.estimate_offset", lambda *_, w=wrong: w)
+        pairs = open_pairs("v", "t", Matching(time_offset=None))
+        assert pairs.pairing.offset == wrong.offset
+        refined = pairs.refined(IDENTITY, lambda _: PlaneDepth())
+        assert refined.pairing.offset == pytest.approx(late, abs=0.03)
+        assert len(refined.notes) == 2 + trusted
+        assert "frames register best with the source late by" in refined.notes[-2]
+        assert f"{refined.pairing.offset:+.4f} s" in refined.notes[-1]
+
+
+def test_a_rig_finds_clocks_that_agree_behind_a_wrong_estimate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    visible, thermal = pans(0.02)
+    monkeypatch.setattr("xcalib.footage.opening.open_stream", {"v": visible, "t": thermal}.get)
+    wrong = OffsetEstimate(1.1, True, 0.5, 0.2, 1.1)
+    monkeypatch.setattr("xcalib.footage.opening.estimate_offset", lambda *_: wrong)
+    refined = open_pairs("v", "t", Matching(time_offset=None)).refined(
+        IDENTITY, lambda _: PlaneDepth()
+    )
+    assert refined.pairing.offset == pytest.approx(0.02, abs=0.03)
+
+
+def test_a_rig_that_stands_still_tells_no_offset_by_registration() -> None:
+    visible, thermal = pans(0.15, moves=False)
+    candidates = offsets_around(0.1, visible, thermal)
+    found = refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates)
+    assert not found.told and found.offset == pytest.approx(0.1)
+    assert "change too little to confirm" in found.line()
+
+
+@pytest.mark.parametrize("command", ["register", "evaluate", "calibrate"])
+def test_too_few_frames_tell_no_offset_and_every_command_says_so(
+    rendered: Path, tmp_path: Path, command: str
+) -> None:
+    for name in ("visible", "thermal"):
+        lines = [f"{p.name} {0.1 * i}\n" for i, p in enumerate(list_files(rendered / name))]
+        (tmp_path / f"{name}.txt").write_text("".join(lines))
+    rig, out = rendered / "rig.yaml", tmp_path / "out.yaml"
+    frames = (rendered / "visible", rendered / "thermal", "--depth", rendered / "depth")
+    times = [
+        f"--{k}-times={tmp_path / n}.txt"
+        for k, n in (("reference", "visible"), ("source", "thermal"))
+    ]
+    given = {
+        "register": (rig, *frames, "-o", tmp_path / "out"),
+        "evaluate": (rig, *frames),
+        "calibrate": (*frames, "--initial", rig, "-o", out, "--working-width", 160),
+    }[command]
+    result = run(command, *given, *times, "--time-offset", "auto")
+    assert result.exit_code == 0, result.output
+    assert "moves too little to tell a clock offset, 0 s is used" in result.stderr
+    assert "clock offset: too few frames overlap to confirm" in result.stderr
+    assert f"{FRAMES} pairs by time" in result.stderr
+
+
+def test_frames_that_cannot_be_decoded_do_not_hinder_the_offset() -> None:
+    visible, thermal = pans(0.2)
+    whole = thermal.read
+
+    def read(index: int) -> Image:
+        if index % 50 == 10:
+            raise DecodeError(f"pan frame {index}: cannot decode")
+        return whole(index)
+
+    thermal.read = read  # type: ignore[method-assign]
+    assert estimate_offset(visible, thermal).offset == pytest.approx(0.2, abs=0.008)
+    candidates = offsets_around(0.2, visible, thermal)
+    assert refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates, 40).told
 
 
 def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> None:

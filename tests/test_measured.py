@@ -145,14 +145,14 @@ def test_both_ways_of_a_pose_agree_and_sizes_scale(tmp_path: Path) -> None:
     ("text", "problem"),
     [
         ("intrinsics: [1, 1, 1, 1]", "camera_from_lidar is missing"),
-        (YAML.format(pose=QUARTER_TURN) + "extra: 1", "extra is unknown"),
+        (YAML.format(pose=QUARTER_TURN) + "extra: 1", "unknown key 'extra'"),
         (YAML.format(pose=[[1, 0, 0, 0]] * 3), "no rotation"),
         (YAML.format(pose=[[1, 0], [0, 1]]), "expected 3x4 numbers"),
         (YAML.format(pose="{quaternion_wxyz: [1, 0, 0, 1]}"), "quaternion_wxyz and translation_m"),
         (YAML.format(pose="{quaternion_wxyz: [1, 1, 0, 0], translation_m: [0, 0, 0]}"), "unit len"),
         (YAML.format(pose=QUARTER_TURN).replace("[100, ", "[-100, "), "expected above 0"),
         ("[", "not YAML"),
-        ("just words", "expected a mapping"),
+        ("just words", "expected keys and values"),
     ],
 )
 def test_bad_lidar_calibrations_are_named(tmp_path: Path, text: str, problem: str) -> None:
@@ -407,3 +407,30 @@ def test_commands_refuse_what_does_not_fit(
     assert "go with --depth stereo:FOLDER" in refused(*common, *given, *out)
     lidar = ("--depth", rendered / "depth", "--lidar-calibration", tmp_path / "no.yaml")
     assert "expected bin, pcd, ply files" in refused(*common, *lidar, *out).replace(".", "")
+    lidar = ("--depth", "plane", "--lidar-calibration", tmp_path / "no.yaml")
+    line = refused(*common, *lidar, *out)
+    assert "--lidar-calibration: --depth plane is no folder, expected one with scans" in line
+
+
+@pytest.mark.parametrize(
+    ("flag", "named"),
+    [
+        ("--complete", "--refine-plane fits the plane itself, which --complete would change"),
+        ("--depth-steady", "which --depth-steady would change"),
+        ("--depth=depth", "--refine-plane goes with --depth plane, not depth"),
+    ],
+)
+def test_refining_the_plane_refuses_what_it_does_not_go_with_at_once(
+    tmp_path: Path, refused: Callable[..., str], flag: str, named: str
+) -> None:
+    """Before anything is opened: the footage is not there."""
+    arguments = (
+        "nowhere",
+        "nowhere",
+        "--depth=plane",
+        flag,
+        "--refine-plane",
+        "-o",
+        tmp_path / "r",
+    )
+    assert named in refused("calibrate", *arguments)

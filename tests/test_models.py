@@ -153,7 +153,13 @@ def test_names_stay_in_the_folder(server: Server, folder: Path, name: str) -> No
 
 
 def test_addresses_are_checked(folder: Path) -> None:
-    for url in ("file:///etc/hostname", "depth", "ftp://host/a.onnx", "https://"):
+    for url in (
+        "file:///etc/hostname",
+        "depth",
+        "ftp://host/a.onnx",
+        "https://",
+        "http://host/a b.onnx",
+    ):
         with pytest.raises(InputError, match=f"{re.escape(url)}' is neither an http"):
             fetch(url)
     with pytest.raises(InputError, match=r"no address .* depth-pro; see https://github\.com/apple"):

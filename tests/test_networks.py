@@ -564,7 +564,7 @@ def test_recipe_file_alone_is_enough(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("kind: metric\nsise: 518", "unknown field 'sise', expected .*size"),
+        ("kind: metric\nsise: 518", "unknown key 'sise', expected .*size"),
         ("kind: log", "kind is 'log', expected one of metric"),
         ("kind: [metric]", "kind is .*expected a word"),
         ("kind: metric\nsize: wide", "size is 'wide', expected pixels"),
@@ -583,9 +583,9 @@ def test_recipe_file_alone_is_enough(tmp_path: Path) -> None:
         ("kind: metric\nresize: fit", "resize is 'fit', expected one of shorter"),
         ("kind: metric\ncolour: hsv", "colour is 'hsv', expected rgb or bgr"),
         ("recipe: resnet", "depth recipe 'resnet' is not known, expected .*zoedepth"),
-        ("- kind", "expected fields of a depth recipe"),
-        ("kind: [", "not a YAML file"),
-        ("!!python/object/apply:os.system ['true']", "not a YAML file"),
+        ("- kind", "expected keys and values, one a line: .*kind"),
+        ("kind: [", "not YAML"),
+        ("!!python/object/apply:os.system ['true']", "not YAML"),
     ],
 )
 def test_recipe_files_are_strict(tmp_path: Path, text: str, problem: str) -> None:

@@ -20,8 +20,8 @@ from xcalib._core import (
     Rig,
     SearchOptions,
     calibrate,
-    choose_frames,
 )
+from xcalib.choose import choose_frames
 
 __version__ = _version("xcalib-rgbt")
 

@@ -13,16 +13,17 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ._core import choose_frames
+from ._core import CalibrationOptions
+from ._core import choose_frames as draw_frames
 from .depth.provider import reciprocal
-from .frames import DecodeError, Image, gray
+from .frames import DecodeError, Image, InputError, gray
 
 Floats = NDArray[np.float32]
 Read = Callable[[int], tuple[Image, Image, Floats | None]]
@@ -103,6 +104,65 @@ class Choice:
         return "\n".join(rows)
 
 
+def choose_frames(
+    references: Sequence[Image],
+    sources: Sequence[Image],
+    depths: Sequence[Floats] | None = None,
+    max_frames: int = CalibrationOptions().max_frames,
+    seed: int = CalibrationOptions().seed,
+) -> Choice:
+    """The frames to give to `calibrate`: those that say most about the rig together.
+
+    >>> chosen = choose_frames(visible, thermal, depths).indices
+    >>> given = ([images[i] for i in chosen] for images in (visible, thermal, depths))
+    >>> result = calibrate(*given)
+
+    Parameters
+    ----------
+    references, sources
+        Images in any form that `calibrate` takes, in sequences of one length. At most
+        ``CANDIDATES * max_frames`` of each are looked at, one by one and none is kept, so that a
+        sequence may read or render its images when they are asked for, as `footage.Stream` does.
+    depths
+        Depth maps ``(h, w)`` float32 [m] of the references; None leaves depth out of the choice.
+    max_frames
+        Frames wanted, at least 1.
+    seed
+        Draws the frames that are looked at.
+
+    Returns the choice: ``indices``, rising, and ``candidates`` with what became of each frame.
+
+    Raises
+    ------
+    InputError
+        Sequences of different lengths, no frames, images of one camera that differ in size, or
+        ``max_frames`` below 1.
+    """
+    count = len(references)
+    counts = [len(items) for items in (references, sources, depths) if items is not None]
+    if not count or set(counts) != {count}:
+        raise InputError(
+            f"references, sources and depths are {', '.join(map(str, counts))} frames,"
+            " expected as many of each, at least 1"
+        )
+    if max_frames < 1:
+        raise InputError(f"max_frames is {max_frames}, expected at least 1")
+
+    shapes: list[tuple[int, ...]] = []
+
+    def read(index: int) -> tuple[Image, Image, Floats | None]:
+        images = references[index], sources[index]
+        for name, image, first in zip(("reference", "source"), images, shapes, strict=False):
+            if image.shape[:2] != first:
+                raise InputError(
+                    f"{name} {index} has shape {image.shape}, expected {first} as those before it"
+                )
+        shapes[:] = [image.shape[:2] for image in images]
+        return *images, None if depths is None else depths[index]
+
+    return choose_informed(count, max_frames, seed, read)
+
+
 def choose_informed(
     count: int,
     max_frames: int,
@@ -126,7 +186,7 @@ def choose_informed(
 
     Returns the choice; without a usable frame it is empty.
     """
-    drawn = choose_frames(count, min(CANDIDATES * max_frames, count), seed)
+    drawn = draw_frames(count, min(CANDIDATES * max_frames, count), seed)
     candidates = [_candidate(index, read) for index in watch(drawn)]
     _leave_bad_images(candidates)
     usable = [candidate for candidate in candidates if candidate.usable]
@@ -147,11 +207,17 @@ def _candidate(index: int, read: Read) -> Candidate:
         reference, source, depth = read(index)
     except DecodeError as error:
         return Candidate(index, str(error))
-    dark = gray(reference)
+    dark, heat = gray(reference), gray(source)
+    broken = [
+        f"{name} has pixels that are not finite"
+        for name, image in (("reference", dark), ("source", heat))
+        if not np.isfinite(image).all()
+    ]
+    dark, heat = (np.nan_to_num(image, posinf=0, neginf=0) for image in (dark, heat))
     if reference.dtype != np.float32:
         # As the objective does, for the edges of a night image lie in its darkest tenth.
         dark = np.log1p(20 * dark).astype(np.float32)
-    first, second = _small(dark), _small(gray(source))
+    first, second = _small(dark), _small(heat)
     found = Candidate(
         index,
         edges=(_contrast(first), _contrast(second)),
@@ -165,6 +231,7 @@ def _candidate(index: int, read: Read) -> Candidate:
     for name, image, ends in (("reference", reference, "top"), ("source", source, "both")):
         if _share_at_end(image, ends) > SATURATED:
             found.reason = f"{name} is saturated"
+    found.reason = broken[0] if broken else found.reason
     return found
 
 

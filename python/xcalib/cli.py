@@ -122,9 +122,9 @@ frames_arguments = options(
 )
 
 
-def open_frames(inputs: dict[str, Any], threads: int) -> Frames:
+def open_frames(inputs: dict[str, Any], threads: int, rig: Rig | None) -> Frames:
     """Open what `frames_arguments` names, and say how frames were paired by time."""
-    frames = Frames.open(threads=threads, **inputs)
+    frames = Frames.open(threads=threads, rig=rig, **inputs)
     for note in frames.notes:
         click.echo(note, err=True)
     return frames
@@ -319,6 +319,12 @@ def calibrate_command(
         raise click.UsageError(
             f"--refine-plane goes with --depth plane, not {inputs['depth_spec']}"
         )
+    for flag in ("--complete", "--depth-steady"):
+        if refine_plane and inputs[flag[2:].replace("-", "_")]:
+            raise click.UsageError(
+                f"--refine-plane fits the plane itself, which {flag} would change; expected only"
+                " one of them"
+            )
     calibration = CalibrationOptions(
         max_frames=max_frames,
         seed=seed,
@@ -339,7 +345,7 @@ def calibrate_command(
             calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
 
     initial_rig = Rig.load(initial) if initial else None
-    frames = open_frames(inputs, threads)
+    frames = open_frames(inputs, threads, initial_rig)
     check_file_writable(output)
     if report_file:
         check_file_writable(report_file)
@@ -445,7 +451,7 @@ def register_command(
     Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
     """
     rig = Rig.load(rig_file)
-    frames = open_frames(inputs, threads)
+    frames = open_frames(inputs, threads, rig)
     for name in ("reference", "source", "depth_spec"):
         if Path(inputs[name]).resolve() == output.resolve():
             raise InputError(f"output folder {output} is an input folder, expected another")
@@ -491,7 +497,7 @@ def evaluate_command(
 ) -> None:
     """Score the registered SOURCE against REFERENCE, beside the source that is only resized."""
     rig = Rig.load(rig_file)
-    frames = open_frames(inputs, threads)
+    frames = open_frames(inputs, threads, rig)
     if json_file:
         check_file_writable(json_file)
     frames = with_scalar_sources(frames, source_colormap)

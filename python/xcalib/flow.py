@@ -9,18 +9,19 @@ at ``p + flow[p]`` in the warped source; ``flow`` is ``(H, W, 2)`` float32 [px],
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Protocol
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from ._core import FlowOptions, patch_flow
 from .frames import Image, InputError, gray, size_of
 from .onnx import Network
+from .yaml_file import load_yaml
 
 __all__ = ["Flow", "FlowOptions", "FlowProvider", "NetworkFlow", "PatchFlow", "patch_flow"]
 
@@ -77,16 +78,7 @@ class Preparation:
         """Read the file; without one the defaults hold, which are RAFT's before its own scaling."""
         if not path.is_file():
             return Preparation()
-        try:
-            document = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
-        if not isinstance(document, dict):
-            raise InputError(f"{path}: expected keys and values, one a line")
-        names = [item.name for item in fields(Preparation)]
-        for key in document:
-            if key not in names:
-                raise InputError(f"{path}: unknown key {key!r}, expected {', '.join(names)}")
+        document = load_yaml(path, optional=[item.name for item in fields(Preparation)])
         values: dict[str, Any] = {}
         for key, value in document.items():
             if key == "flow_from":
@@ -128,20 +120,28 @@ class NetworkFlow:
         Disagreement of the two directions at which confidence is 0 [px], > 0.
     num_threads
         0 uses every core.
+    providers
+        Short names of execution providers, the preferred first: ``"cuda,cpu"``.
 
     Raises
     ------
     InputError
-        A file is not what it should be.
+        A file is not what it should be, or a provider is not there.
     """
 
-    def __init__(self, model: str | Path, tolerance: float = 2.0, num_threads: int = 0) -> None:
+    def __init__(
+        self,
+        model: str | Path,
+        tolerance: float = 2.0,
+        num_threads: int = 0,
+        providers: str | Sequence[str] = "cpu",
+    ) -> None:
         if not 0 < tolerance < np.inf:
             raise InputError(f"flow tolerance is {tolerance:g}, expected above 0 px")
         self.path = Path(model)
         self.tolerance = tolerance
         self.preparation = Preparation.read(self.path.with_suffix(".yaml"))
-        self._network = Network(self.path, num_threads=num_threads)
+        self._network = Network(self.path, providers, num_threads)
         inputs = self._network.inputs
         if len(inputs) != 2:
             names = ", ".join(item.name for item in inputs)

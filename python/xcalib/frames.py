@@ -167,14 +167,14 @@ def decode(path: Path) -> Image:
     data = path.read_bytes()
     image = None
     with quiet_opencv(), contextlib.suppress(cv2.error):
-        if data and not _is_truncated(data):
+        if data and not is_truncated(data):
             image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise DecodeError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
     return image
 
 
-def _is_truncated(data: bytes) -> bool:
+def is_truncated(data: bytes) -> bool:
     """Whether a PNG or JPEG ends early: OpenCV would return it with a gray or black rest."""
     if data.startswith(b"\x89PNG"):
         return b"\x00\x00\x00\x00IEND\xaeB`\x82" not in data

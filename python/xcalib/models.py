@@ -88,7 +88,8 @@ def fetch(
             " and give the file's own address"
         )
     parts = urlsplit(url)
-    if parts.scheme not in ("http", "https") or not parts.netloc:
+    plain = url.isascii() and url.isprintable() and " " not in url  # as urllib wants it
+    if parts.scheme not in ("http", "https") or not parts.netloc or not plain:
         known = ", ".join(RECIPES)
         raise InputError(f"{url!r} is neither an http(s) address nor one of {known}")
     name = name or unquote(parts.path).rsplit("/", 1)[-1]

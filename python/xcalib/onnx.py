@@ -61,7 +61,8 @@ class Network:
     path
         The .onnx file; weights in other files (external data) are found beside it.
     providers
-        Short names of execution providers, the preferred first.
+        Short names of execution providers, the preferred first; a string names them with commas
+        between, ``"cuda,cpu"``.
     num_threads
         0 means all cores.
 
@@ -73,13 +74,15 @@ class Network:
     """
 
     def __init__(
-        self, path: str | Path, providers: Sequence[str] = ("cpu",), num_threads: int = 0
+        self, path: str | Path, providers: str | Sequence[str] = "cpu", num_threads: int = 0
     ) -> None:
         import onnxruntime
 
         self.path = Path(path)
         if not self.path.is_file():
             raise InputError(f"{path}: no such file")
+        if isinstance(providers, str):
+            providers = [name.strip() for name in providers.split(",")]
         known = available_providers()
         for provider in providers:
             if provider.lower() not in known:

@@ -29,7 +29,7 @@ from .depth import (
 )
 from .depth.plane_fit import fit_plane, spread
 from .flow import FlowProvider
-from .footage import Matching, Stream, open_pairs, open_sink
+from .footage import Matching, Pairs, Stream, TopicDepth, open_pairs, open_sink
 from .footage.opening import PickedDepth
 from .footage.pairing import median_period
 from .frames import DecodeError, Image, InputError, fit_rig, overlay, size_of
@@ -78,9 +78,13 @@ class Frames:
         max_gap: float | None = Matching.max_gap,
         reference_times: Path | None = None,
         source_times: Path | None = None,
+        rig: Rig | None = None,
         **measured: Any,
     ) -> Frames:
-        """Open frames as the arguments of the commands name them; the rest is `MeasuredDepth`."""
+        """Open frames as the arguments of the commands name them; the rest is `MeasuredDepth`.
+
+        With a ``rig`` an estimated clock offset is refined, see `Pairs.refined`.
+        """
         matching = Matching(pairing, time_offset, max_gap, reference_times, source_times)
         pairs = open_pairs(reference, source, matching)
         plane = PlaneDepth(camera_height, horizon, far, plane_hfov, plane_roll)
@@ -89,12 +93,17 @@ class Frames:
             depth_focal,
             inverse_scale,
             inverse_shift,
-            tuple(name.strip() for name in providers.split(",")),
+            providers,
             threads,
         )
         given = depth_scale, plane, network, MeasuredDepth(**measured)
-        depth = pairs.open_depth(depth_spec, *given)
-        return Frames(pairs.references, pairs.sources, depth, pairs.notes)
+
+        def open_depth(pairs: Pairs) -> DepthProvider:
+            return pairs.open_depth(depth_spec, *given)
+
+        if rig is not None:
+            pairs = pairs.refined(rig, open_depth)
+        return Frames(pairs.references, pairs.sources, open_depth(pairs), pairs.notes)
 
     def __len__(self) -> int:
         return len(self.references)
@@ -121,7 +130,7 @@ class Frames:
 
 def choose_by_content(frames: Frames, max_frames: int, seed: int, quiet: bool = False) -> Choice:
     """The frames that say most about the rig, see `choose`. Depth counts where it is cheap."""
-    cheap = isinstance(frames.given_depth, FolderDepth | PlaneDepth)
+    cheap = isinstance(frames.given_depth, FolderDepth | PlaneDepth | TopicDepth)
 
     def read(index: int) -> tuple[Image, Image, NDArray[np.float32] | None]:
         if cheap:

@@ -35,14 +35,7 @@ class FolderDepth:
 
     def __call__(self, index: int, reference: Image) -> Depth:
         path = self.paths[index]
-        depth = read_depth(path, self.scale)
-        (w, h), (width, height) = size_of(depth), size_of(reference)
-        if not same_aspect((w, h), (width, height)):
-            raise InputError(
-                f"{path}: depth is {w}x{h}, but the reference image is {width}x{height};"
-                " expected the same aspect"
-            )
-        return depth
+        return fitting(read_depth(path, self.scale), reference, str(path))
 
 
 def read_depth(path: str | Path, scale: float = PNG_SCALE) -> Depth:
@@ -69,9 +62,25 @@ def read_depth(path: str | Path, scale: float = PNG_SCALE) -> Depth:
         if not np.issubdtype(values.dtype, np.floating):
             raise InputError(f"{path}: depth is {values.dtype}, expected floats in metres")
         depth = values.astype(np.float32)
+    return known(depth, str(path))
+
+
+def known(depth: Depth, where: str) -> Depth:
+    """The map with 0, in place, where it is not positive and finite; some pixel must be."""
     depth[~((depth > 0) & np.isfinite(depth))] = 0
     if not depth.any():
-        raise InputError(f"{path}: all depth is unknown, expected some pixels above 0 m")
+        raise InputError(f"{where}: all depth is unknown, expected some pixels above 0 m")
+    return depth
+
+
+def fitting(depth: Depth, reference: Image, where: str) -> Depth:
+    """The map, if it has the aspect of the reference image."""
+    (w, h), (width, height) = size_of(depth), size_of(reference)
+    if not same_aspect((w, h), (width, height)):
+        raise InputError(
+            f"{where}: depth is {w}x{h}, but the reference image is {width}x{height};"
+            " expected the same aspect"
+        )
     return depth
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import Image, InputError, Size, list_files, pair, same_aspect, size_of
+from ..yaml_file import load_yaml
 from .points import POINT_SUFFIXES, Points, read_points
 from .provider import Depth
-from .yaml_file import load_yaml
 
 Array = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def _kitti(path: Path) -> LidarCalibration:
 
 
 def _yaml(path: Path) -> LidarCalibration:
-    document = load_yaml(path, {"intrinsics", "camera_from_lidar"}, {"image_size"})
+    document = load_yaml(path, ("intrinsics", "camera_from_lidar"), ("image_size",))
     fx, fy, cx, cy = _numbers(path, "intrinsics", document["intrinsics"], (4,))
     K = _intrinsics(path, np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
     pose = document["camera_from_lidar"]

@@ -47,6 +47,10 @@ class MeasuredDepth:
             raise InputError(f"depth {spec}: stereo options go with --depth {STEREO}FOLDER")
         if self.lidar_calibration is None:
             return None
+        if spec == "plane" or not Path(spec).is_dir():
+            raise InputError(
+                f"--lidar-calibration: --depth {spec} is no folder, expected one with scans"
+            )
         return LidarDepth(spec, reference_paths, self.lidar_calibration)
 
     def _geometry(self) -> StereoGeometry:

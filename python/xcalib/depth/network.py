@@ -48,7 +48,8 @@ class NetworkOptions:
     scale: float | None = None
     shift: float | None = None
     """In place of the recipe's, see `Recipe.kind`."""
-    providers: tuple[str, ...] = ("cpu",)
+    providers: str | Sequence[str] = "cpu"
+    """See `xcalib.onnx.Network`."""
     num_threads: int = 0
     """0 means all cores."""
     cache: Path | None = None

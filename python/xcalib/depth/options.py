@@ -20,7 +20,8 @@ DEPTH_OPTIONS: tuple[Callable[[Any], Any], ...] = (
         required=True,
         help="Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr in m;"
         " 0 unknown) or lidar scan (.bin, .pcd, .ply), `stereo:FOLDER` of the right camera's"
-        " images, an .onnx file of a network, or `plane` for a flat road.",
+        " images, a bag with a topic of depth (drive.mcap#/depth), an .onnx file of a network, or"
+        " `plane` for a flat road.",
     ),
     number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256"),
     number(

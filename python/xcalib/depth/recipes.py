@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from ..frames import InputError
+from ..yaml_file import load_yaml
 
 IMAGENET_MEAN = (0.485, 0.456, 0.406)
 IMAGENET_STD = (0.229, 0.224, 0.225)
@@ -353,16 +352,8 @@ _SCHEMA = {
 
 def read_recipe_fields(path: Path) -> dict[str, Any]:
     """The fields in a recipe file, of the types `Recipe` has; ``recipe`` may be among them."""
-    try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a YAML file: {error}") from None
-    if not isinstance(document, dict):
-        raise InputError(f"{path}: expected fields of a depth recipe, `kind: metric` for one")
     fields = {}
-    for key, value in document.items():
-        if key not in _SCHEMA:
-            raise InputError(f"{path}: unknown field {key!r}, expected {', '.join(_SCHEMA)}")
+    for key, value in load_yaml(path, optional=_SCHEMA).items():
         convert, expected = _SCHEMA[key]
         try:
             fields[key] = convert(value)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import Image, InputError, gray, list_files, pair, read_image, size_of
+from ..yaml_file import load_yaml
 from .provider import Depth
-from .yaml_file import load_yaml
 
 BLOCK = 5
 """Side of the matched blocks [px]."""
@@ -46,7 +46,7 @@ def read_stereo_geometry(path: str | Path) -> StereoGeometry:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected a stereo calibration (.yaml)")
-    document = load_yaml(path, {"baseline", "focal"}, {"doffs"})
+    document = load_yaml(path, ("baseline", "focal"), ("doffs",))
     for key, value in document.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise InputError(f"{path}: {key} is {value!r}, expected a number")

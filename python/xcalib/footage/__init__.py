@@ -8,8 +8,9 @@
 from __future__ import annotations
 
 from .bag import BagImages, CameraInfo, camera_infos, is_bag
+from .depth_topic import TopicDepth
 from .files import ImageFiles, Pages
-from .offset import OffsetEstimate, estimate_offset, refine_offset
+from .offset import OffsetEstimate, RefinedOffset, estimate_offset, offsets_around, refine_offset
 from .opening import Matching, Pairs, open_pairs
 from .pairing import METHODS, Pairing, match_depths, pair_streams, pair_times
 from .sources import open_stream
@@ -31,14 +32,17 @@ __all__ = [
     "Pairs",
     "Part",
     "Picked",
+    "RefinedOffset",
     "Sink",
     "Stream",
+    "TopicDepth",
     "Video",
     "camera_infos",
     "estimate_offset",
     "is_bag",
     "is_video",
     "match_depths",
+    "offsets_around",
     "open_pairs",
     "open_sink",
     "open_stream",

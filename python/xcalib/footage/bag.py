@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frames import Image, InputError
+from ..frames import DecodeError, Image, InputError, as_image, is_truncated, quiet_opencv
 from .stream import Stream, Times
 
 if TYPE_CHECKING:
@@ -37,10 +38,11 @@ ENCODINGS: dict[str, tuple[type[np.generic], int, int | None]] = {
     "rgba8": (np.uint8, 4, cv2.COLOR_RGBA2BGR),
     "bgr16": (np.uint16, 3, None),
     "rgb16": (np.uint16, 3, cv2.COLOR_RGB2BGR),
-    "bayer_rggb8": (np.uint8, 1, cv2.COLOR_BAYER_RGGB2BGR),
-    "bayer_bggr8": (np.uint8, 1, cv2.COLOR_BAYER_BGGR2BGR),
-    "bayer_gbrg8": (np.uint8, 1, cv2.COLOR_BAYER_GBRG2BGR),
-    "bayer_grbg8": (np.uint8, 1, cv2.COLOR_BAYER_GRBG2BGR),
+    **{
+        f"bayer_{pattern}{bits}": (dtype, 1, getattr(cv2, f"COLOR_BAYER_{pattern.upper()}2BGR"))
+        for pattern in ("rggb", "bggr", "gbrg", "grbg")
+        for bits, dtype in ((8, np.uint8), (16, np.uint16))
+    },
     "yuv422_yuy2": (np.uint8, 2, cv2.COLOR_YUV2BGR_YUY2),
     "yuv422": (np.uint8, 2, cv2.COLOR_YUV2BGR_UYVY),
 }
@@ -63,10 +65,16 @@ class BagImages(Stream):
         self.topic, self._kind = _image_topic(self._bag, path, topic)
         self._connections = [c for c in self._bag.connections if c.topic == self.topic]
         self._logged: list[int] = []
-        stamps = []
-        for _, logged, data in self._bag.messages(self._connections):
-            self._logged.append(logged)
-            stamps.append(self._stamp(data))
+        stamps: list[int] = []
+        try:
+            for _, logged, data in self._bag.messages(self._connections):
+                self._logged.append(logged)
+                stamps.append(self._stamp(data, len(stamps)))
+        except InputError:
+            raise
+        except Exception as error:  # each storage of rosbags has errors of its own
+            where = self.where(len(stamps))
+            raise InputError(f"{where}: not readable, the bag is damaged: {error}") from None
         if not stamps:
             raise InputError(f"{path}#{self.topic}: no message, expected images")
         for nanoseconds in (stamps, self._logged):
@@ -77,8 +85,10 @@ class BagImages(Stream):
         self._messages: Iterator[tuple[Any, int, bytes]] = iter(())
         self._next = -1
 
-    def _stamp(self, data: bytes) -> int:
+    def _stamp(self, data: bytes, index: int) -> int:
         """Nanoseconds of the header, which stands first in both kinds of image."""
+        if len(data) < 12:
+            raise InputError(f"{self.where(index)}: {len(data)} bytes, expected an image message")
         if self._bag.is2:
             seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
         else:
@@ -89,18 +99,24 @@ class BagImages(Stream):
         return len(self._logged)
 
     def read(self, index: int) -> Image:
-        if index != self._next:
-            # Messages of one time of recording come in the order of the bag.
-            logged = self._logged[index]
-            self._messages = self._bag.messages(self._connections, start=logged)
-            for _ in range(index - self._logged.index(logged)):
-                next(self._messages)
-        connection, _, data = next(self._messages)
-        self._next = index + 1
-        message = self._bag.deserialize(data, connection.msgtype)
-        if self._kind == COMPRESSED:
-            return _decompressed(message, self.where(index))
-        return _unpacked(message, self.where(index))
+        try:
+            if index != self._next:
+                # Messages of one time of recording come in the order of the bag.
+                logged = self._logged[index]
+                self._messages = self._bag.messages(self._connections, start=logged)
+                for _ in range(index - self._logged.index(logged)):
+                    next(self._messages)
+            self._next = -1  # nowhere known, unless this message comes
+            connection, _, data = next(self._messages)
+            self._next = index + 1
+            message: Any = self._bag.deserialize(data, connection.msgtype)
+        except Exception as error:  # numpy's, struct's and rosbags' own
+            raise DecodeError(f"{self.where(index)}: cannot decode the message: {error}") from None
+        if self._kind != COMPRESSED:
+            return _unpacked(message, self.where(index))
+        if "compresseddepth" in message.format.lower():
+            return _decompressed_depth(message, self.where(index))
+        return _decompressed(message, self.where(index))
 
     def name(self, index: int) -> str:
         return f"{index:06d}"
@@ -115,7 +131,7 @@ def _opened(path: Path) -> AnyReader:
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise InputError(
-            f"{path}: bags need the library rosbags; install xcalib-rgbt[ros]"
+            f"{path}: bags need the library rosbags, `pip install rosbags`"
         ) from None
     if not path.exists():
         raise InputError(f"{path}: no such bag")
@@ -156,7 +172,7 @@ def _unpacked(message: Any, where: str) -> Image:
     pixel = np.dtype(dtype).itemsize * channels
     data: NDArray[np.uint8] = np.asarray(message.data, np.uint8)
     if min(width, height) < 1 or step < width * pixel or data.size < step * height:
-        raise InputError(
+        raise DecodeError(
             f"{where}: {data.size} bytes, rows of {step}, are no {width}x{height}"
             f" {message.encoding} image"
         )
@@ -170,14 +186,39 @@ def _unpacked(message: Any, where: str) -> Image:
 
 def _decompressed(message: Any, where: str) -> Image:
     """The pixels of a sensor_msgs/CompressedImage: JPEG, PNG or what else OpenCV decodes."""
+    return _decoded(np.asarray(message.data, np.uint8), message.format, where)
+
+
+def _decompressed_depth(message: Any, where: str) -> Image:
+    """A depth image of image_transport's compressed_depth: ``(h, w)``, uint16 [mm] or float32 [m].
+
+    Three numbers of 4 bytes, then a PNG. Of a 16UC1 image that is the depth itself; of a 32FC1 one
+    its inverse: depth = A / (value - B) with the second and third number, 0 unknown.
+    """
     data = np.asarray(message.data, np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-    if image is None or image.dtype not in (np.uint8, np.uint16, np.float32):
-        raise InputError(
-            f"{where}: cannot decode {data.size} bytes, format {message.format!r};"
-            " expected a JPEG or PNG"
+    values = _decoded(data[12:], message.format, where)
+    if values.ndim != 2 or values.dtype != np.uint16:
+        shape = "x".join(map(str, values.shape))
+        raise DecodeError(f"{where}: depth is {shape} {values.dtype}, expected a 16-bit gray PNG")
+    if not message.format.startswith("32FC1"):
+        return values
+    scale, shift = data[4:12].view("<f4").tolist()
+    inverse = values.astype(np.float32) - np.float32(shift)
+    known = (values > 0) & (inverse > 0)
+    depth: Image = np.divide(np.float32(scale), inverse, out=np.zeros_like(inverse), where=known)
+    return depth
+
+
+def _decoded(data: NDArray[np.uint8], kind: str, where: str) -> Image:
+    """An encoded image, without alpha."""
+    image: Image | None = None
+    with quiet_opencv(), contextlib.suppress(cv2.error):
+        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    if image is None or is_truncated(data.tobytes()):
+        raise DecodeError(
+            f"{where}: cannot decode {data.size} bytes, format {kind!r}; expected a JPEG or PNG"
         )
-    return image[..., :3].copy() if image.ndim == 3 else image
+    return as_image(image, where)
 
 
 @dataclass(frozen=True)

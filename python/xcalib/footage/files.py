@@ -12,6 +12,7 @@ import cv2
 
 from ..frames import (
     IMAGE_SUFFIXES,
+    DecodeError,
     Image,
     InputError,
     as_image,
@@ -87,7 +88,7 @@ class Pages(Stream):
         with quiet_opencv(), contextlib.suppress(cv2.error):
             done, pages = cv2.imreadmulti(str(self.path), index, 1, flags=cv2.IMREAD_UNCHANGED)
         if not done or len(pages) != 1:
-            raise InputError(f"{self.where(index)}: cannot decode, truncated")
+            raise DecodeError(f"{self.where(index)}: cannot decode, truncated")
         return as_image(pages[0], self.where(index))
 
     def name(self, index: int) -> str:

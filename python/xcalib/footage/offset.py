@@ -7,6 +7,7 @@ parts of the scene tell, and correlated over time.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,8 +17,8 @@ from numpy.typing import NDArray
 
 from .. import metrics
 from .._core import Registrar, Rig
-from ..depth import DepthProvider
-from ..frames import Image, InputError, fit_rig, gray, size_of
+from ..depth import Depth, DepthProvider
+from ..frames import DecodeError, Image, InputError, fit_rig, gray, size_of
 from .pairing import median_period, pair_times
 from .stream import Stream, Times
 
@@ -25,6 +26,7 @@ GRID = (4, 6)
 """Rows and columns of cells."""
 WIDTH = 160
 """Width at which edges are taken [px]."""
+NO_TIMES = "a clock offset needs times of both streams' frames; expected them"
 MIN_CORRELATION = 0.2
 """Of a peak that tells."""
 MIN_CONTRAST = 0.12
@@ -75,7 +77,7 @@ def estimate_offset(
         Without times, or where they do not overlap.
     """
     if references.times is None or sources.times is None:
-        raise InputError("a clock offset needs times of both streams' frames; expected them")
+        raise InputError(NO_TIMES)
     middle = max(0, (len(references) - max_frames) // 2)
     own = np.arange(len(references))[middle : middle + max_frames]
     begin, end = references.times[own[0]], references.times[own[-1]]
@@ -90,8 +92,10 @@ def estimate_offset(
         return OffsetEstimate(0.0, False, 0.0, 0.0, 0.0)
     periods = median_period(references.times[own]), median_period(sources.times[other])
     step = max(periods) / 2
-    first = _resampled(*_edge_motion(references, own), step)
-    second = _resampled(*_edge_motion(sources, other), step)
+    motions = _edge_motion(references, own), _edge_motion(sources, other)
+    if min(len(times) for times, _ in motions) < 15:
+        return OffsetEstimate(0.0, False, 0.0, 0.0, 0.0)
+    first, second = (_resampled(*motion, step) for motion in motions)
     return _peak(first, second, step, min(max_offset, (end - begin) / 3))
 
 
@@ -99,15 +103,17 @@ def _edge_motion(stream: Stream, indices: NDArray[np.intp]) -> tuple[Times, Arra
     """Times (N - 1,) between frames, and the change of edges per cell (N - 1, cells)."""
     assert stream.times is not None
     before: NDArray[np.float32] | None = None
-    changes = []
+    changes, times = [], []
     for index in indices:
-        edges = _edges(stream[int(index)])
-        if before is not None:
-            cells = cv2.resize(np.abs(edges - before), GRID[::-1], interpolation=cv2.INTER_AREA)
-            changes.append(cells.ravel())
-        before = edges
-    times = stream.times[indices]
-    return (times[1:] + times[:-1]) / 2, np.array(changes, np.float64)
+        with contextlib.suppress(DecodeError):  # named when its turn comes; the next ones tell
+            edges = _edges(stream[int(index)])
+            if before is not None:
+                cells = cv2.resize(np.abs(edges - before), GRID[::-1], interpolation=cv2.INTER_AREA)
+                changes.append(cells.ravel())
+            before = edges
+            times.append(stream.times[index])
+    seconds = np.array(times)
+    return (seconds[1:] + seconds[:-1]) / 2, np.array(changes, np.float64)
 
 
 def _edges(image: Image) -> NDArray[np.float32]:
@@ -186,6 +192,38 @@ def _correlation(a: Array, b: Array, shift: int) -> float:
     return float((each[:-1].mean() + each[-1]) / 2)
 
 
+@dataclass(frozen=True)
+class RefinedOffset:
+    """A clock offset chosen by how well frames register, and what speaks for it."""
+
+    offset: float
+    """By how much the source's clock is late [s]; the middle candidate where nothing is told."""
+    told: bool
+    """Whether the frames register worse at both ends of the candidates."""
+    scores: list[float]
+    """Mean NEC of the frames judged, at each candidate; empty if fewer than two can be."""
+
+    def line(self) -> str:
+        """In one line."""
+        if not self.scores:
+            return "too few frames overlap to confirm or refine it by registration"
+        figures = (
+            f"NEC up to {max(self.scores):.3f}, at the ends of the offsets tried"
+            f" {self.scores[0]:.3f} and {self.scores[-1]:.3f}"
+        )
+        if self.told:
+            return f"frames register best with the source late by {self.offset:+.4f} s ({figures})"
+        return f"registered frames change too little to confirm or refine it ({figures})"
+
+
+def offsets_around(guess: float, references: Stream, sources: Stream) -> list[float]:
+    """Candidates for `refine_offset`: 6 frames of the faster stream either way, in quarters [s]."""
+    if references.times is None or sources.times is None:
+        raise InputError(NO_TIMES)
+    period = min(median_period(references.times), median_period(sources.times))
+    return [guess + period * quarters / 4 for quarters in range(-24, 25)]
+
+
 def refine_offset(
     rig: Rig,
     references: Stream,
@@ -193,8 +231,12 @@ def refine_offset(
     depth: DepthProvider,
     candidates: Sequence[float],
     max_frames: int = 12,
-) -> tuple[float, list[float]]:
+) -> RefinedOffset:
     """Choose among candidate offsets by how well the frames register with a rig.
+
+    Of the candidates that differ from the best by less than the frames do among each other (two
+    standard errors of the mean), the one nearest to the middle is taken: the guess, unless the
+    frames speak against it. Those that pair the same frames score the same.
 
     Parameters
     ----------
@@ -205,40 +247,73 @@ def refine_offset(
     depth
         Of the reference frames.
     candidates
-        Offsets [s]; those that pair the same frames score the same.
+        Offsets [s], rising, around a guess in their middle.
     max_frames
-        References judged, spread over the footage; the same ones for every candidate.
+        Frames of the slower stream judged, spread over the footage; the same ones for every
+        candidate. Those with an image that cannot be decoded are left out.
 
-    Returns
-    -------
-    offset, scores
-        The candidate of the largest mean NEC (the middle one of equals), and the NEC of each.
+    Raises
+    ------
+    InputError
+        Without candidates or times.
     """
     if not candidates:
         raise InputError("no candidate offsets, expected some")
     if references.times is None or sources.times is None:
-        raise InputError("a clock offset needs times of both streams' frames; expected them")
-    partners = []
+        raise InputError(NO_TIMES)
+    # A frame of the slower stream, and the pair it is in at each candidate.
+    slower = int(len(references) > len(sources))
+    pairs: list[dict[int, tuple[int, int]]] = []
+    # Wider than pairing itself: jitter must not take a frame's partner away between two others.
+    gap = 0.75 * max(median_period(references.times), median_period(sources.times)) or None
     for offset in candidates:
-        found = pair_times(references.times, sources.times, offset)
-        partners.append(dict(zip(found.references.tolist(), found.sources.tolist(), strict=True)))
-    common = sorted(set.intersection(*(set(partner) for partner in partners)))
-    if not common:
-        raise InputError("no reference frame has a partner at every candidate offset")
+        try:
+            found = pair_times(references.times, sources.times, offset, gap)
+        except InputError:
+            return RefinedOffset(float(candidates[len(candidates) // 2]), False, [])
+        both = zip(found.references.tolist(), found.sources.tolist(), strict=True)
+        pairs.append({pair[slower]: pair for pair in both})
+    common = sorted(set.intersection(*(set(each) for each in pairs)))
     spread = np.linspace(0, len(common) - 1, min(max_frames, len(common))).round().astype(int)
-    registrar = Registrar(fit_rig(rig, size_of(references[0]), size_of(sources[0])))
-    totals = np.zeros(len(candidates))
-    for index in (common[place] for place in spread):
-        reference = references[index]
-        metres = depth(index, reference)
-        scores: dict[int, float] = {}
-        for place, partner in enumerate(partners):
-            other = partner[index]
-            if other not in scores:
-                image, mask = registrar.register(sources[other], metres)
-                value = metrics.nec(reference, image, mask == 0) if (mask == 0).any() else 0.0
-                scores[other] = float(np.nan_to_num(value))
-            totals[place] += scores[other]
-    means = (totals / len(spread)).tolist()
-    top = np.flatnonzero(totals >= totals.max() - 1e-12)
-    return float(candidates[int(top[len(top) // 2])]), means
+    judge = _Judge(rig, references, sources, depth)
+    rows = []
+    for frame in (common[place] for place in spread):
+        with contextlib.suppress(DecodeError):
+            scores = {pair: judge(*pair) for pair in sorted({each[frame] for each in pairs})}
+            rows.append([scores[each[frame]] for each in pairs])
+    return _chosen(candidates, np.array(rows).reshape(-1, len(candidates)))
+
+
+class _Judge:
+    """NEC of a reference and a source frame, registered."""
+
+    def __init__(self, rig: Rig, references: Stream, sources: Stream, depth: DepthProvider) -> None:
+        self._rig, self._references, self._sources, self._depth = rig, references, sources, depth
+        self._registrar: Registrar | None = None
+        self._last: tuple[int, Image, Depth] | None = None
+
+    def __call__(self, index: int, other: int) -> float:
+        if self._last is None or self._last[0] != index:
+            image = self._references[index]
+            self._last = index, image, self._depth(index, image)
+        _, reference, metres = self._last
+        source = self._sources[other]
+        if self._registrar is None:
+            self._registrar = Registrar(fit_rig(self._rig, size_of(reference), size_of(source)))
+        registered, mask = self._registrar.register(source, metres)
+        valid = mask == 0
+        return float(np.nan_to_num(metrics.nec(reference, registered, valid))) if valid.any() else 0
+
+
+def _chosen(candidates: Sequence[float], scores: Array) -> RefinedOffset:
+    """The verdict on ``scores``, the NEC of each frame (N,) at each of the candidates."""
+    middle = len(candidates) // 2
+    if len(scores) < 2:
+        return RefinedOffset(float(candidates[middle]), False, [])
+    means = scores.mean(axis=0)
+    lost = scores[:, [int(means.argmax())]] - scores
+    error = lost.std(axis=0, ddof=1) / np.sqrt(len(scores))
+    worse = lost.mean(axis=0) > np.maximum(2 * error, 1e-12)
+    told = bool(worse[0] and worse[-1])
+    near = min(np.flatnonzero(~worse).tolist(), key=lambda place: abs(place - middle))
+    return RefinedOffset(float(candidates[near if told else middle]), told, means.tolist())

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import Rig
 from ..depth import (
     DEPTH_SUFFIXES,
     PNG_SCALE,
@@ -20,8 +23,15 @@ from ..depth import (
 )
 from ..depth.points import POINT_SUFFIXES
 from ..frames import Image, InputError, list_files
-from .offset import estimate_offset
-from .pairing import Pairing, match_depths, pair_streams
+from .depth_topic import TopicDepth, is_depth_topic
+from .offset import (
+    OffsetEstimate,
+    RefinedOffset,
+    estimate_offset,
+    offsets_around,
+    refine_offset,
+)
+from .pairing import Pairing, match_depth_stream, match_depths, pair_streams
 from .sources import open_stream
 from .stream import Picked, Stream
 from .times import read_times
@@ -61,6 +71,9 @@ class Pairs:
     pairing: Pairing
     notes: tuple[str, ...]
     """What the user should know, a line each."""
+    matching: Matching = Matching()
+    estimate: OffsetEstimate | None = None
+    """Of the clock offset, where that was asked for."""
 
     @property
     def references(self) -> Stream:
@@ -72,6 +85,46 @@ class Pairs:
         """Their partners, in the same order."""
         return _picked(self.all_sources, self.pairing.sources)
 
+    def refined(self, rig: Rig, open_depth: Callable[[Pairs], DepthProvider]) -> Pairs:
+        """Paired anew with the offset at which frames register best with the rig, `refine_offset`.
+
+        ``open_depth`` gives the depth of the `references` of pairs. Without an estimated offset
+        the pairs stay as they are, and so they do where the registered frames tell neither around
+        the estimate nor around 0.
+        """
+        if self.estimate is None:
+            return self
+        found = self._refined(self.estimate.peak, rig, open_depth)
+        if not found.told and self.estimate.offset:
+            # A peak elsewhere may be as high, and most clocks are meant to agree.
+            again = self._refined(0.0, rig, open_depth)
+            found = again if again.told else found
+        notes = [f"clock offset: {found.line()}"]
+        if self.estimate.trusted or not found.told:
+            notes.insert(0, self.notes[0])
+        pairing = self.pairing
+        if found.told:
+            streams = self.all_references, self.all_sources
+            pairing = pair_streams(*streams, "time", found.offset, self.matching.max_gap)
+        return replace(self, pairing=pairing, notes=(*notes, f"frames: {pairing.line()}"))
+
+    def _refined(
+        self, guess: float, rig: Rig, open_depth: Callable[[Pairs], DepthProvider]
+    ) -> RefinedOffset:
+        streams = self.all_references, self.all_sources
+        candidates = offsets_around(guess, *streams)
+        wide, depth = self, None
+        if len(self.all_references) > len(self.all_sources):
+            # The neighbours of a paired reference tell too, if there is depth of them.
+            with contextlib.suppress(InputError):
+                pairings = [pair_streams(*streams, "time", offset) for offset in candidates]
+                every = np.unique(np.concatenate([found.references for found in pairings]))
+                wide = replace(self, pairing=replace(self.pairing, references=every))
+                depth = open_depth(wide)
+        if depth is None:
+            wide, depth = self, open_depth(self)
+        return refine_offset(rig, wide.references, self.all_sources, depth, candidates)
+
     def open_depth(
         self,
         spec: str,
@@ -80,8 +133,16 @@ class Pairs:
         network: NetworkOptions | None = None,
         measured: MeasuredDepth | None = None,
     ) -> DepthProvider:
-        """Depth of `references`; of a folder the files that `match_depths` finds."""
+        """Depth of `references`: of a folder the files that `match_depths` finds, of a bag's topic
+        the frames that `match_depth_stream` does.
+        """
         used, folder = self.pairing.references, Path(spec)
+        if is_depth_topic(spec):
+            stream = open_stream(spec)
+            matched = match_depth_stream(self.all_references, used, stream)
+            measured = measured or MeasuredDepth()
+            provider = measured.open(spec, []) or TopicDepth(stream)
+            return PickedDepth(measured.conditioned(provider), matched)
         given = scale, plane, network, measured
         if spec == "plane" or not folder.is_dir():
             stream = self.all_references
@@ -113,7 +174,7 @@ def open_pairs(
         if table is not None:
             stream.times = read_times(table, stream)
     notes: list[str] = []
-    offset = matching.time_offset
+    offset, estimate = matching.time_offset, None
     if offset is None:
         if matching.method not in ("auto", "time"):
             raise InputError(
@@ -125,4 +186,4 @@ def open_pairs(
     pairing = pair_streams(*streams, matching.method, offset, matching.max_gap)
     if pairing.method == "time":
         notes.append(f"frames: {pairing.line()}")
-    return Pairs(*streams, pairing, tuple(notes))
+    return Pairs(*streams, pairing, tuple(notes), matching, estimate)

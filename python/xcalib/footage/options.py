@@ -40,7 +40,8 @@ FOOTAGE_OPTIONS: tuple[Callable[[Any], Any], ...] = (
         default="0",
         show_default=True,
         callback=clock_offset,
-        help="By how much the source's clock is late [s], or `auto`, from the footage.",
+        help="By how much the source's clock is late [s], or `auto`: from the footage, and from its"
+        " registration where a rig is given.",
     ),
     click.option(
         "--max-gap",

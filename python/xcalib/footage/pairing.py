@@ -160,17 +160,9 @@ def match_depths(
     names = [references.name(int(index)) for index in used]
     if len(own) == len(depths) and all(name in own for name in names):
         return [own[name] for name in names]
-    timed = ImageFiles(depths)
-    if references.times is not None and timed.times is not None:
-        times = references.times[used]
-        found = pair_times(times, timed.times, 0.0, median_period(references.times) / 2 or None)
-        if len(found.references) < len(times):
-            lost = sorted(set(range(len(times))) - set(found.references.tolist()))[0]
-            raise InputError(
-                f"{folder}: no depth map near the time of {references.where(int(used[lost]))},"
-                f" {times[lost]:.6f} s"
-            )
-        return [int(index) for index in found.sources]
+    times = ImageFiles(depths).times
+    if references.times is not None and times is not None:
+        return _nearest_depths(references, used, times, str(folder))
     everything = len(depths) == len(references)
     picked = range(len(references)) if everything else [int(index) for index in used]
     stand_ins = [
@@ -182,3 +174,36 @@ def match_depths(
     index_of = {path: index for index, path in enumerate(depths)}
     matched = [index_of[depth] for _, depth in pair(stand_ins, depths)]
     return [matched[int(index)] for index in used] if everything else matched
+
+
+def match_depth_stream(references: Stream, used: NDArray[np.intp], depths: Stream) -> list[int]:
+    """The frame of a stream of depth for each reference frame in use.
+
+    The nearest in time within half a period of the references, where both tell it; else in order,
+    of as many as all reference frames or those in use.
+    """
+    if references.times is not None and depths.times is not None:
+        return _nearest_depths(references, used, depths.times, depths.where(0))
+    if len(depths) == len(references):
+        return [int(index) for index in used]
+    if len(depths) == len(used):
+        return list(range(len(used)))
+    raise InputError(
+        f"{depths.where(0)} is the first of {len(depths)} depth maps, {references.where(0)} of"
+        f" {len(references)} reference frames; expected as many, or times of both"
+    )
+
+
+def _nearest_depths(
+    references: Stream, used: NDArray[np.intp], depths: Times, where: str
+) -> list[int]:
+    assert references.times is not None
+    times = references.times[used]
+    found = pair_times(times, depths, 0.0, median_period(references.times) / 2 or None)
+    if len(found.references) < len(times):
+        lost = sorted(set(range(len(times))) - set(found.references.tolist()))[0]
+        raise InputError(
+            f"{where}: no depth map near the time of {references.where(int(used[lost]))},"
+            f" {times[lost]:.6f} s"
+        )
+    return [int(index) for index in found.sources]

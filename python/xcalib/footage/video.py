@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ..frames import Image, InputError, quiet_opencv
+from ..frames import DecodeError, Image, InputError, quiet_opencv
 from .stream import Stream
 
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv")
@@ -81,11 +81,12 @@ class Video(Stream):
             self._restart()
         while self._next <= index:
             if not self._capture.grab():
-                raise InputError(f"{self.where(index)}: cannot decode, truncated or changed")
+                self._next = len(self)  # nowhere known: the next frame is sought anew
+                raise DecodeError(f"{self.where(index)}: cannot decode, truncated or changed")
             self._next += 1
         done, image = self._capture.retrieve()
         if not done:
-            raise InputError(f"{self.where(index)}: cannot decode")
+            raise DecodeError(f"{self.where(index)}: cannot decode")
         return np.ascontiguousarray(image)
 
     def _seek(self, index: int) -> bool:

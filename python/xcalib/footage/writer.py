@@ -64,6 +64,7 @@ class VideoSink:
     def __init__(self, path: Path, rate: float) -> None:
         self.path, self.rate = path, rate
         self._writers: dict[Path, tuple[Path, cv2.VideoWriter]] = {}
+        self._kinds: dict[Path, tuple[object, ...]] = {}
 
     def __enter__(self) -> VideoSink:
         return self
@@ -92,6 +93,14 @@ class VideoSink:
     def _write(self, path: Path, image: Image) -> None:
         if path not in self._writers:
             self._writers[path] = self._opened(path, image)
+        # OpenCV would leave out, or misread, what is not like the first frame.
+        kind = (*image.shape, str(image.dtype))
+        first = self._kinds.setdefault(path, kind)
+        if kind != first:
+            raise InputError(
+                f"{path}: a frame is {kind}, the first is {first}; a video holds frames of one"
+                " kind, a folder any"
+            )
         self._writers[path][1].write(image)
 
     def _opened(self, path: Path, image: Image) -> tuple[Path, cv2.VideoWriter]:
