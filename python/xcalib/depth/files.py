@@ -102,7 +102,7 @@ def _read_values(path: Path) -> NDArray[np.generic]:
         except InputError as error:
             raise InputError(
                 f"{error}, or this OpenCV is built without OpenEXR (as the pip wheels are):"
-                " install xcalib-rgbt[exr]; .npy and .tiff in metres are read everywhere"
+                " `pip install OpenEXR`; .npy and .tiff in metres are read everywhere"
             ) from None
     return decode(path)
 

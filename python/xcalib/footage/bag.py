@@ -130,9 +130,7 @@ def _opened(path: Path) -> AnyReader:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise InputError(
-            f"{path}: bags need the library rosbags, `pip install rosbags`"
-        ) from None
+        raise InputError(f"{path}: bags need the library rosbags, `pip install rosbags`") from None
     if not path.exists():
         raise InputError(f"{path}: no such bag")
     try:
