@@ -339,10 +339,10 @@ def test_relative_depth_without_scale_keeps_the_order(
     known = depth > 0
     assert np.all(np.diff(depth[known]) <= 0)  # the ramp comes nearer
     far, near = np.percentile(raw, (2, 98))
-    scale, shift = normalization(raw)
-    assert 1 / (scale * far + shift) == pytest.approx(80)
-    assert 1 / (scale * near + shift) == pytest.approx(2)
-    assert math.isfinite(sum(normalization(np.full((3, 4), 7, np.float32))))
+    found = normalization(raw)
+    assert 1 / (found.scale * far + found.shift) == pytest.approx(80)
+    assert 1 / (found.scale * near + found.shift) == pytest.approx(2)
+    assert math.isfinite(normalization(np.full((3, 4), 7, np.float32)).shift)
 
 
 def test_canonical_focal_length(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

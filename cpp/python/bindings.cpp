@@ -356,6 +356,25 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
              "The same camera behind an image of another size [px].")
         .def("__repr__", &text_of);
 
+    py::class_<RelativeDepth>(m, "RelativeDepth",
+                              R"(Relative inverse depth r in metres: D = 1 / (scale r + shift).
+
+A rig that was calibrated with it has its translation in the unit that the scale stands for.)")
+        .def(py::init([](double scale, double shift) {
+                 const RelativeDepth relative{scale, shift};
+                 relative.validate("RelativeDepth");
+                 return relative;
+             }),
+             py::arg("scale"), py::arg("shift"),
+             "Raises ValueError where the scale is not > 0, or a value not finite.")
+        .def_readonly("scale", &RelativeDepth::scale, "> 0")
+        .def_readonly("shift", &RelativeDepth::shift, "[1/m], if the scale is of metres.")
+        .def("__repr__", [](const RelativeDepth& r) {
+            std::ostringstream out;
+            out << "RelativeDepth(scale=" << r.scale << ", shift=" << r.shift << ")";
+            return out.str();
+        });
+
     py::class_<Rig>(m, "Rig", R"(A reference and a source camera, fixed to each other.
 
 `R` and `t` take points of the reference camera to the source camera: X_S = R X_R + t.)")
@@ -377,6 +396,8 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
                 rig = make_rig(rig.reference, rig.source, py::cast(rig.R()), py::cast(t));
             },
             "(3,) float64 translation, source_from_reference [m].")
+        .def_readwrite("relative_depth", &Rig::relative_depth,
+                       "RelativeDepth it was calibrated with, or None: metric depth.")
         .def_property_readonly(
             "quaternion_wxyz",
             [](const Rig& rig) {
@@ -467,6 +488,9 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
                        "Horizontal field of view to assume [deg], or None to search it.")
         .def_readwrite("optimize_reference", &CalibrationOptions::optimize_reference,
                        "Free the reference's intrinsics too; they are coupled with the source's.")
+        .def_readwrite("relative_depth", &CalibrationOptions::relative_depth,
+                       "RelativeDepth that the depth maps were made with: the shift is estimated, "
+                       "the scale kept, and the rig has both. None: metric depth.")
         .def_readwrite("search", &CalibrationOptions::search, "SearchOptions.")
         .def_property(
             "solver", [](const CalibrationOptions& o) { return word_of(o.solver, kSolvers); },

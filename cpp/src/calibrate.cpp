@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "adam.hpp"
+#include "relative_depth.hpp"
 #include "solve.hpp"
 #include "start.hpp"
 #include "verdict.hpp"
@@ -61,6 +62,28 @@ void search_and_refine(const WorkingImages& images, const ImageView& reference,
     }
 }
 
+// Estimates the shift of relative depth; images and rig are then those of the shifted depth.
+void settle_relative_depth(const CalibrationOptions& options, WorkingImages& images,
+                           CalibrationResult& result) {
+    const double farthest = farthest_inverse_depth(images);
+    RelativeDepth relative = *options.relative_depth;
+    double shift = 0;
+    if (options.source_camera) {
+        shift = best_shift(images, options, farthest, result.rig);
+        images = with_shifted_depth(images, shift);
+        const Level level = make_level(images, 1, result.rig, options.num_threads);
+        result.report.levels.push_back(solve_level(level, {}, 2,
+                                                   0.8 * result.report.levels.back().valid_share,
+                                                   1e-5, options, result.rig));
+    } else {
+        shift = ordinary_shift(result.rig, farthest);
+        images = with_shifted_depth(images, shift);
+        result.rig = with_shifted_depth(result.rig, shift);
+    }
+    relative.shift += shift;
+    result.rig.relative_depth = relative;
+}
+
 }  // namespace
 
 void CalibrationOptions::validate() const {
@@ -86,6 +109,7 @@ void CalibrationOptions::validate() const {
             search.min_overlap, "a share in (0, 1)");
     require(search.map_width >= 32, "search.map_width", search.map_width, "at least 32 px");
     require(search.candidates >= 1, "search.candidates", search.candidates, "at least 1");
+    if (relative_depth) relative_depth->validate("options: relative_depth");
     if (solver != Solver::adam) return;
     if (search.mode == SearchMode::full || search.mode == SearchMode::local)
         throw std::invalid_argument(
@@ -151,8 +175,8 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
     report.frames =
         choose_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
     tell("prepare", 0.0);
-    const WorkingImages images = make_working_images(references, sources, depths, report.frames,
-                                                     options.working_width, options.num_threads);
+    WorkingImages images = make_working_images(references, sources, depths, report.frames,
+                                               options.working_width, options.num_threads);
     report.working_width = images.references[0].width;
     report.working_height = images.references[0].height;
 
@@ -165,6 +189,7 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
     } else {
         search_and_refine(images, references[0], sources[0], initial, options, flow, tell, result);
     }
+    if (options.relative_depth) settle_relative_depth(options, images, result);
     report.nec = report.levels.back().nec;
     report.valid_share = report.levels.back().valid_share;
     judge(images, result.rig, options, report);

@@ -113,7 +113,12 @@ void Pinhole::validate(const char* name) const {
 Rig Rig::resized(int reference_width, int reference_height, int source_width,
                  int source_height) const {
     return {reference.resized(reference_width, reference_height),
-            source.resized(source_width, source_height), source_from_reference};
+            source.resized(source_width, source_height), source_from_reference, relative_depth};
+}
+
+void RelativeDepth::validate(const char* name) const {
+    require(std::isfinite(scale) && scale > 0, name, "scale", scale, "a finite number > 0");
+    require(std::isfinite(shift), name, "shift", shift, "a finite number");
 }
 
 void Rig::validate() const {
@@ -125,6 +130,7 @@ void Rig::validate() const {
     for (int i = 0; i < 3; ++i)
         require(std::isfinite(t()[i]), "source_from_reference", "translation", t()[i],
                 "a finite number of metres");
+    if (relative_depth) relative_depth->validate("relative_depth");
 }
 
 Eigen::Vector3d unproject(const Pinhole& camera, double u, double v, double z) {

@@ -30,17 +30,19 @@ std::string text_of(double value) {
     return std::string(buffer, end);
 }
 
-// A mapping of which every key is known and present.
+// A mapping of which every key is known, and present but for those that may be left out.
 class Section {
    public:
     Section(const std::string& path, std::string name, const YAML::Node& node,
-            std::initializer_list<const char*> keys)
+            std::initializer_list<const char*> keys,
+            std::initializer_list<const char*> optional = {})
         : path_(path), name_(std::move(name)), node_(node) {
         if (!node.IsMap()) reject(path, "expected a mapping of fields in " + name_);
         for (const auto& item : node) {
             const std::string key = item.first.as<std::string>();
             bool known = false;
-            for (const char* expected : keys) known = known || key == expected;
+            for (const auto& list : {keys, optional})
+                for (const char* expected : list) known = known || key == expected;
             if (!known) reject(path, "unknown field '" + key + "' in " + name_);
         }
         for (const char* key : keys)
@@ -125,7 +127,8 @@ void write_camera(std::ostream& out, const char* name, const Pinhole& camera) {
 
 Rig parse_rig(const std::string& path, const YAML::Node& root) {
     const Section file(path, "the file", root,
-                       {"format", "version", "reference", "source", "source_from_reference"});
+                       {"format", "version", "reference", "source", "source_from_reference"},
+                       {"relative_depth"});
     if (file.text("format") != "xcalib-rig") file.fail("format", file.text("format"), "xcalib-rig");
     if (file.text("version") != "1") file.fail("version", file.text("version"), "1");
     const Section pose(path, "source_from_reference", file.node("source_from_reference"),
@@ -137,6 +140,10 @@ Rig parse_rig(const std::string& path, const YAML::Node& root) {
     rig.source = read_camera(path, "source", file.node("source"));
     rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
     rig.source_from_reference.translation = Eigen::Vector3d(t[0], t[1], t[2]);
+    if (const YAML::Node node = file.node("relative_depth")) {
+        const Section relative(path, "relative_depth", node, {"scale", "shift"});
+        rig.relative_depth = RelativeDepth{relative.number("scale"), relative.number("shift")};
+    }
     try {
         rig.validate();
     } catch (const std::invalid_argument& error) {
@@ -175,6 +182,10 @@ void save_rig(const Rig& rig, const std::string& path) {
         << text_of(q.y()) << ", " << text_of(q.z()) << "]\n"
         << "  translation_m: [" << text_of(rig.t().x()) << ", " << text_of(rig.t().y()) << ", "
         << text_of(rig.t().z()) << "]\n";
+    if (rig.relative_depth)  // inverse depth = scale r + shift
+        out << "relative_depth:\n"
+            << "  scale: " << text_of(rig.relative_depth->scale) << "\n"
+            << "  shift: " << text_of(rig.relative_depth->shift) << "\n";
     const std::string beside = path + ".part" + std::to_string(::getpid());
     {
         std::ofstream file(beside, std::ios::binary);

@@ -75,14 +75,6 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
     return space;
 }
 
-// `count` of the pairs, spread over the footage: neighbours look alike.
-WorkingImages some_frames(const WorkingImages& images, std::size_t count) {
-    count = std::min(count, images.size());
-    std::vector<std::size_t> indices;
-    for (std::size_t i = 0; i < count; ++i) indices.push_back(i * images.size() / count);
-    return images.subset(indices);
-}
-
 // What candidates are compared by: how well edges agree beyond chance, and over how much of the
 // image. Chance grows as the overlap shrinks.
 double merit(const NecValue& value) { return value.aligned * std::sqrt(value.valid_share); }
@@ -274,7 +266,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
                  const CalibrationOptions& options, const FlowEstimator& flow,
                  const std::function<void(double)>& progress) {
     constexpr std::size_t kFrames = 12;
-    const WorkingImages images = some_frames(all_images, kFrames);
+    const WorkingImages images = all_images.spread(kFrames);
     const int num_threads = options.num_threads;
     const double start = seconds_now();
     Start out;
@@ -299,7 +291,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     const bool focal_free =
         !options.reference_camera && !options.reference_hfov_deg && !options.source_camera;
     // Placing costs hundreds of evaluations: fewer frames tell enough.
-    const WorkingImages few = some_frames(images, kFrames / 2);
+    const WorkingImages few = images.spread(kFrames / 2);
     const InverseDepths inverse = inverse_depths(few.pyramid.at(kCoarse));
     std::vector<Candidate> candidates;
     for (const SearchCandidate& peak : found) {

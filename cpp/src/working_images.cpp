@@ -151,6 +151,13 @@ WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) con
     return out;
 }
 
+WorkingImages WorkingImages::spread(std::size_t count) const {
+    count = std::min(count, size());
+    std::vector<std::size_t> indices;
+    for (std::size_t i = 0; i < count; ++i) indices.push_back(i * size() / count);
+    return subset(indices);
+}
+
 namespace {
 
 // Source pixels to a reference pixel at this level, along the width, if the source were so wide.

@@ -25,6 +25,8 @@ struct WorkingImages {
     std::size_t size() const { return references.size(); }
     // The pairs of these indices.
     WorkingImages subset(const std::vector<std::size_t>& indices) const;
+    // `count` of them at most, spread over the footage: neighbours look alike.
+    WorkingImages spread(std::size_t count) const;
 };
 
 inline constexpr int kFactors[] = {8, 4, 2, 1};

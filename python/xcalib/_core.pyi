@@ -54,6 +54,21 @@ class Pinhole:
     def resized(self, width: int, height: int) -> Pinhole:
         """The same camera behind an image of another size [px]."""
 
+class RelativeDepth:
+    """Relative inverse depth r in metres: D = 1 / (scale r + shift).
+
+    A rig that was calibrated with it has its translation in the unit that the scale stands
+    for.
+    """
+    def __init__(self, scale: float, shift: float) -> None:
+        """Raises ValueError where the scale is not > 0, or a value not finite."""
+    @property
+    def scale(self) -> float:
+        """> 0"""
+    @property
+    def shift(self) -> float:
+        """[1/m], if the scale is of metres."""
+
 class Rig:
     """A reference and a source camera, fixed to each other.
 
@@ -68,6 +83,8 @@ class Rig:
     """(3, 3) float64 rotation, source_from_reference."""
     t: NDArray[float64]
     """(3,) float64 translation, source_from_reference [m]."""
+    relative_depth: RelativeDepth | None
+    """RelativeDepth it was calibrated with, or None: metric depth."""
 
     def __init__(
         self,
@@ -162,6 +179,10 @@ class CalibrationOptions:
     """Horizontal field of view to assume [deg], or None to search it."""
     optimize_reference: bool
     """Free the reference's intrinsics too; they are coupled with the source's."""
+    relative_depth: RelativeDepth | None
+    """RelativeDepth that the depth maps were made with: the shift is estimated, the scale kept,
+    and the rig has both. None: metric depth.
+    """
     search: SearchOptions
     """SearchOptions."""
     solver: str

@@ -24,6 +24,7 @@ from .depth import (
     DepthProvider,
     FolderDepth,
     MeasuredDepth,
+    NetworkDepth,
     NetworkOptions,
     PlaneDepth,
 )
@@ -99,11 +100,18 @@ class Frames:
         given = depth_scale, plane, network, MeasuredDepth(**measured)
 
         def open_depth(pairs: Pairs) -> DepthProvider:
-            return pairs.open_depth(depth_spec, *given)
+            depth = pairs.open_depth(depth_spec, *given)
+            network = relative_network(depth)
+            if network is not None and rig is not None:
+                network.relative = rig.relative_depth
+            return depth
 
         if rig is not None:
             pairs = pairs.refined(rig, open_depth)
-        return Frames(pairs.references, pairs.sources, open_depth(pairs), pairs.notes)
+        depth = open_depth(pairs)
+        note = misfit(depth, rig) if rig is not None else ""
+        notes = (*pairs.notes, note) if note else pairs.notes
+        return Frames(pairs.references, pairs.sources, depth, notes)
 
     def __len__(self) -> int:
         return len(self.references)
@@ -126,6 +134,23 @@ class Frames:
     def fit(self, rig: Rig) -> Rig:
         """The rig at the size of these frames, which the first one tells."""
         return fit_rig(rig, size_of(self.references[0]), size_of(self.sources[0]))
+
+
+def relative_network(depth: object) -> NetworkDepth | None:
+    """The network behind a provider, where its depth has a scale and a shift to be estimated."""
+    while depth is not None and not isinstance(depth, NetworkDepth):
+        depth = getattr(depth, "depth", None) or getattr(depth, "provider", None)
+    return depth if depth is not None and depth.is_relative else None
+
+
+def misfit(depth: DepthProvider, rig: Rig) -> str:
+    """A line where depth and rig do not go together, or ''."""
+    relative = relative_network(depth) is not None
+    if relative and rig.relative_depth is None:
+        return "depth is relative, the rig metric: its scale is guessed for every frame"
+    if not relative and rig.relative_depth is not None:
+        return "the rig was calibrated with relative depth: metres do not fit its translation"
+    return ""
 
 
 def choose_by_content(frames: Frames, max_frames: int, seed: int, quiet: bool = False) -> Choice:
@@ -162,6 +187,11 @@ def run_calibration(
     """
     if chosen is None:
         chosen = choose_frames(len(frames), calibration.max_frames, calibration.seed)
+    network = relative_network(frames.depth)
+    if network is not None:
+        network.relative = initial.relative_depth if initial is not None else None
+        network.relative = network.relative or network.pooled(_readable(frames.references, chosen))
+        calibration.relative_depth = network.relative
     loaded: list[tuple[int, tuple[Image, Image, NDArray[np.float32]]]] = []
     failures: list[DecodeError] = []
     for index in progress(chosen, len(chosen), "loading", quiet):
@@ -197,6 +227,15 @@ def run_calibration(
         except ValueError as error:
             raise InputError(_with_file_name(str(error), frames.references, chosen)) from None
     return result, chosen
+
+
+def _readable(stream: Stream, chosen: Sequence[int]) -> Iterator[Image]:
+    """Those of the chosen images that can be decoded."""
+    for index in chosen:
+        try:
+            yield stream[index]
+        except DecodeError:
+            continue
 
 
 def with_fitted_plane(

@@ -250,5 +250,21 @@ TEST_F(RigFile, TheProgramsLocaleHasNoSay) {
     EXPECT_EQ(refusal([&] { expect_identical(load_rig(path_), rig); }), "");
 }
 
+TEST_F(RigFile, RelativeDepthIsKeptWhereThereIsOne) {
+    write_with("translation_m: [0.1, -0.2, 0.3]\n",
+               "translation_m: [0.1, -0.2, 0.3]\nrelative_depth:\n  scale: 0.25\n  shift: -0.5\n");
+    const Rig rig = load_rig(path_);
+    ASSERT_TRUE(rig.relative_depth);
+    EXPECT_EQ(rig.relative_depth->scale, 0.25);
+    EXPECT_EQ(rig.relative_depth->shift, -0.5);
+    save_rig(rig.resized(320, 240, 160, 128), path_);
+    EXPECT_EQ(load_rig(path_).relative_depth->shift, -0.5);
+    write_with("format", "relative_depth: {scale: 0, shift: 1}\nformat");
+    const std::string message = refusal([&] { load_rig(path_); });
+    EXPECT_TRUE(has(message, "relative_depth: scale = 0, expected a finite number > 0")) << message;
+    write_with("format", "relative_depth: {scale: 1}\nformat");
+    EXPECT_TRUE(has(refusal([&] { load_rig(path_); }), "missing field 'shift' in relative_depth"));
+}
+
 }  // namespace
 }  // namespace xcalib

@@ -72,6 +72,10 @@ struct CalibrationOptions {
     // The reference's intrinsics and the source's are coupled (a gauge): free only on request.
     bool optimize_reference = false;
 
+    // The depth maps are 1 / (scale r + shift) of relative inverse depth: the shift is estimated,
+    // the scale stays as the gauge of the translation, and the rig has both. None: metric.
+    std::optional<RelativeDepth> relative_depth;
+
     SearchOptions search;
     Solver solver = Solver::ceres;
     AdamOptions adam;

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 
 namespace xcalib {
 
@@ -39,11 +40,21 @@ struct Pose {
     Eigen::Vector3d translation = Eigen::Vector3d::Zero();         // [m]
 };
 
+// Relative inverse depth r, as many networks give it, in metres: D = 1 / (scale r + shift).
+struct RelativeDepth {
+    double scale = 1.0;  // > 0; the unit of the translation goes with it
+    double shift = 0.0;
+
+    // Throws std::invalid_argument naming `name`, the field, its value and what was expected.
+    void validate(const char* name) const;
+};
+
 // Two cameras fixed to each other. The reference gives the pixel grid, the source is warped to it.
 struct Rig {
     Pinhole reference;
     Pinhole source;
     Pose source_from_reference;
+    std::optional<RelativeDepth> relative_depth;  // none: calibrated with metric depth
 
     Eigen::Matrix3d R() const { return source_from_reference.rotation.toRotationMatrix(); }
     const Eigen::Vector3d& t() const { return source_from_reference.translation; }

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import RelativeDepth
 from ..cache import ResultCache, file_hash
 from ..frames import Image, InputError, Size, same_aspect, size_of
 from ..onnx import ImageInput, Network
@@ -27,6 +28,8 @@ MEAN_COLOUR = (0.485, 0.456, 0.406)
 """Fills what a letterboxed image leaves free: the mean of ImageNet, 0 after normalization."""
 FAR, NEAR = 80.0, 2.0
 """Where `normalization` puts the far and the near end of relative depth [m], for want of better."""
+FARTHEST = 1e4
+"""What relative depth says lies beyond infinity is as far as this [m]."""
 STEP = 0.1
 """Depths that differ by more than this share are of two surfaces: nothing lies between them."""
 
@@ -96,6 +99,8 @@ class NetworkDepth:
         if options.shift is not None:
             recipe = dataclasses.replace(recipe, shift=options.shift)
         self.recipe = recipe
+        self.relative: RelativeDepth | None = None
+        """Scale and shift of relative depth, of a rig; None guesses them for every frame."""
         self.focal = options.focal
         if self.focal is not None and not 0 < self.focal < math.inf:
             raise InputError(f"depth focal length is {self.focal:g}, expected above 0 px")
@@ -131,6 +136,21 @@ class NetworkDepth:
         `to_aspect`.
         """
         return self._raws([reference])[0].values
+
+    # -- Relative depth --------------------------------------------------------------------------
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether the output is inverse depth up to a scale and a shift that nobody has given."""
+        return self.recipe.kind == "relative" and self.recipe.scale is None
+
+    def pooled(self, references: Iterable[Image]) -> RelativeDepth:
+        """One `normalization` for all these images: where a calibration starts."""
+        maps = []
+        for reference in references:
+            values = self._raws([reference])[0].values
+            maps.append(values[np.isfinite(values)])
+        return normalization(np.concatenate(maps))
 
     # -- Running ---------------------------------------------------------------------------------
 
@@ -239,7 +259,7 @@ class NetworkDepth:
 
     def _depth(self, raw: _Raw, size: Size) -> Depth:
         recipe = self.recipe
-        depth = to_depth(raw.values, recipe)
+        depth = to_depth(raw.values, recipe, self.relative)
         seen = math.nan if recipe.focal_output is None else raw.focal
         seen = recipe.canonical_focal or seen
         if self.focal is not None and not math.isnan(seen):
@@ -266,33 +286,33 @@ class NetworkDepth:
         return _Raw(entry["values"], focal, width)
 
 
-def to_depth(values: Array, recipe: Recipe) -> Depth:
+def to_depth(values: Array, recipe: Recipe, relative: RelativeDepth | None = None) -> Depth:
     """Depth ``(h, w)`` [m] that a network's own output means; what is no number stays none.
 
-    Infinity is farther than any depth.
+    Infinity is farther than any depth. ``relative`` is for kind ``relative`` without a scale; None
+    is this map's own `normalization`.
     """
     if recipe.kind == "metric":
         return values * np.float32(1 if recipe.scale is None else recipe.scale)
     if recipe.kind == "relative" and recipe.scale is None:
-        scale, shift = normalization(values)
-    else:
-        scale = 1 if recipe.scale is None else recipe.scale
-        shift = recipe.shift or 0.0
-    inverse = np.float32(scale) * values + np.float32(shift)
+        relative = relative or normalization(values)
+        inverse = np.float32(relative.scale) * values + np.float32(relative.shift)
+        return np.asarray(1 / np.maximum(inverse, np.float32(1 / FARTHEST)), np.float32)
+    scale = 1 if recipe.scale is None else recipe.scale
+    inverse = np.float32(scale) * values + np.float32(recipe.shift or 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(inverse > 0, 1 / inverse, np.where(np.isnan(inverse), np.nan, np.inf))
 
 
-def normalization(values: Array) -> tuple[float, float]:
+def normalization(values: Array) -> RelativeDepth:
     """Scale a and shift b that put relative inverse depth r at ``1 / (a r + b)`` metres.
 
-    The 2nd percentile of the map becomes `FAR`, the 98th `NEAR`: a guess for every map by itself,
-    without metric scale, that only keeps the order of near and far.
+    The 2nd percentile becomes `FAR`, the 98th `NEAR`: a guess without metric scale.
     """
     known = values[np.isfinite(values)]
     low, high = np.percentile(known, (2, 98)) if known.size else (0.0, 0.0)
     scale = (1 / NEAR - 1 / FAR) / max(float(high - low), 1e-6)
-    return scale, 1 / FAR - scale * float(low)
+    return RelativeDepth(scale, 1 / FAR - scale * float(low))
 
 
 def limited(depth: Depth, recipe: Recipe) -> Depth:

@@ -60,6 +60,7 @@ def fit_plane(
         reference_camera=options.reference_camera,
         source_camera=options.source_camera,
         search=SearchOptions(mode="off"),
+        flow="off",  # the plane before is near enough
     )
     known: dict[PlaneDepth, tuple[float, Rig]] = {}
 
