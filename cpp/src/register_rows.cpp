@@ -435,9 +435,11 @@ HWY_INLINE bool sample_window(const RowsTask& task, const Source& source, Float 
     constexpr int kWindow = window<T>();
     constexpr int kBefore = kWindow / 8;  // left of the first point may be some pixels
     const Whole x = floor_or_below(p.u), y = floor_or_below(p.v);
-    const int row = hn::GetLane(y.integer) - kLargeBits;
-    const int first = hn::GetLane(x.integer) - kLargeBits;
-    const int from = std::max(0, std::min(first - kBefore, source.width - 1 - kWindow));
+    // In vectors, where what is far outside may overflow.
+    const int row = hn::GetLane(hn::Sub(y.integer, set(kLargeBits)));
+    const int first = hn::GetLane(hn::Sub(x.integer, set(kLargeBits)));
+    const int last_from = source.width - 1 - kWindow;
+    const int from = std::clamp(first, kBefore, last_from + kBefore) - kBefore;
     if (static_cast<unsigned>(row) >= static_cast<unsigned>(source.height - 1)) return false;
     const Int index = hn::Sub(x.integer, set(from + kLargeBits));
     const Int apart =

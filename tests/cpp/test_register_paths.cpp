@@ -236,5 +236,25 @@ TEST(RegisterPaths, RowsOfTheSourceMayLieAnyWay) {
     });
 }
 
+// Beyond what the kernel's integers hold: those of points in the millions are nonsense, and must
+// not be taken for a place.
+TEST(RegisterPaths, WhatLiesMillionsOfPixelsAwayIsOutside) {
+    on_every_target([] {
+        const Frame<std::uint8_t> source(64, 48, 1);
+        const Image depth(40, 30, 1.0f);
+        for (const double away : {4.2e6, 1.3e7, 2e7, 2.516e7, 3e7, 1e9, 1e15, 1e30})
+            for (const auto& [dx, dy] : {std::pair{away, 0.0}, {-away, 0.0}, {0.0, -away}}) {
+                Rig rig{Pinhole::from_hfov(40, 30, 1.0), Pinhole::from_hfov(64, 48, 1.0), {}};
+                rig.source.cx += dx;
+                rig.source.cy += dy;
+                Frame<std::uint8_t> out(40, 30, 1);
+                std::vector<std::uint8_t> mask(40 * 30, 9);
+                Registrar(rig, RegistrarOptions{1})
+                    .register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
+                EXPECT_EQ(mask, std::vector<std::uint8_t>(40 * 30, 1)) << dx << ", " << dy;
+            }
+    });
+}
+
 }  // namespace
 }  // namespace xcalib
