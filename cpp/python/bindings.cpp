@@ -454,7 +454,8 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
             [](CalibrationOptions& o, const std::string& word) {
                 o.flow = value_of("flow", word, kFlowModes);
             },
-            "The flow term: 'auto' (where nothing is searched), 'on' or 'off'.")
+            "The flow term: 'auto' (where nothing is searched), 'on' (after a search too) or "
+            "'off'.")
         .def_readwrite("flow_weight", &CalibrationOptions::flow_weight,
                        "lambda of Eq. (total_loss); > 0.")
         .def_readwrite("flow_rounds", &CalibrationOptions::flow_rounds,
@@ -466,7 +467,8 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readwrite("reference_hfov_deg", &CalibrationOptions::reference_hfov_deg,
                        "Horizontal field of view to assume [deg], or None to search it.")
         .def_readwrite("optimize_reference", &CalibrationOptions::optimize_reference,
-                       "Free the reference's intrinsics too; they are coupled with the source's.")
+                       "Free the reference's intrinsics too; they are coupled with the source's. "
+                       "The solver 'adam' always does.")
         .def_readwrite("search", &CalibrationOptions::search, "SearchOptions.")
         .def_property(
             "solver", [](const CalibrationOptions& o) { return word_of(o.solver, kSolvers); },
@@ -485,7 +487,7 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readonly("height", &LevelReport::height, "[px]")
         .def_readonly("iterations", &LevelReport::iterations, "Of Levenberg-Marquardt.")
         .def_readonly("initial_cost", &LevelReport::initial_cost,
-                      "Eq. (image_loss), and the prior in stage 1.")
+                      "Eq. (image_loss), and, where they act, the flow term and the prior.")
         .def_readonly("final_cost", &LevelReport::final_cost, "The same at the end.")
         .def_readonly("nec", &LevelReport::nec, "Mean over the pairs, weighted by c_i.")
         .def_readonly("aligned", &LevelReport::aligned, "The same, beyond what chance gives.")

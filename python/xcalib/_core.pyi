@@ -149,7 +149,7 @@ class CalibrationOptions:
     prior_weight: float
     """gamma of Eq. (total_loss), in stage 1; >= 0."""
     flow: str
-    """The flow term: 'auto' (where nothing is searched), 'on' or 'off'."""
+    """The flow term: 'auto' (where nothing is searched), 'on' (after a search too) or 'off'."""
     flow_weight: float
     """lambda of Eq. (total_loss); > 0."""
     flow_rounds: int
@@ -161,7 +161,8 @@ class CalibrationOptions:
     reference_hfov_deg: float | None
     """Horizontal field of view to assume [deg], or None to search it."""
     optimize_reference: bool
-    """Free the reference's intrinsics too; they are coupled with the source's."""
+    """Free the reference's intrinsics too; they are coupled with the source's. The solver 'adam'
+    always does."""
     search: SearchOptions
     """SearchOptions."""
     solver: str
@@ -192,7 +193,7 @@ class LevelReport:
         """Of Levenberg-Marquardt."""
     @property
     def initial_cost(self) -> float:
-        """Eq. (image_loss), and the prior in stage 1."""
+        """Eq. (image_loss), and, where they act, the flow term and the prior."""
     @property
     def final_cost(self) -> float:
         """The same at the end."""
