@@ -357,13 +357,46 @@ def test_results_may_go_to_arrays_of_the_caller() -> None:
         registrar.register(source, depth, out=codes)
     with pytest.raises(ValueError, match=r"mask has shape \(48, 64\) float32, expected .* uint8"):
         registrar.register(source, depth, mask=depth)
-    with pytest.raises(ValueError, match=r"out has .*contiguous and writeable"):
+    with pytest.raises(ValueError, match=r"out has .*contiguous, aligned and writeable"):
         registrar.register(source, depth, out=np.empty((48, 64, 6), np.uint8)[..., ::2])
     out.flags.writeable = False
-    with pytest.raises(ValueError, match=r"out has .*contiguous and writeable"):
+    with pytest.raises(ValueError, match=r"out has .*contiguous, aligned and writeable"):
         registrar.register(source, depth, out=out)
     with pytest.raises(ValueError, match="mask is not a numpy array"):
         registrar.register(source, depth, mask=[0])
+
+
+def test_results_may_not_go_to_what_is_read() -> None:
+    pinhole = Pinhole.from_hfov(64, 48, 45)
+    registrar, depth = Registrar(Rig(pinhole, pinhole)), some_depth()
+    source = np.random.default_rng(6).integers(0, 256, (48, 64), np.uint8)
+    for name, other, arrays in [
+        ("out", "source", {"out": source}),
+        ("mask", "source", {"mask": source}),
+        ("mask", "depth", {"mask": depth.view(np.uint8).reshape(-1, 64)[48:96]}),
+        ("out", "mask", dict.fromkeys(("out", "mask"), np.empty_like(source))),
+    ]:
+        with pytest.raises(ValueError, match=f"{name} overlaps {other}, expected memory of its"):
+            registrar.register(source, depth, **arrays)
+    both = np.empty((96, 64), np.uint8)  # side by side is fine
+    registrar.register(source, depth, out=both[:48], mask=both[48:])
+
+
+def test_numbers_need_not_be_aligned_where_they_are_read() -> None:
+    registrar, depth = Registrar(some_rig()), some_depth()
+    source = np.random.default_rng(8).integers(0, 65536, (42, 56), np.uint16)
+    image, mask = registrar.register(source, depth)
+
+    def odd(array: np.ndarray) -> np.ndarray:
+        return np.frombuffer(bytearray(b"?" + array.tobytes()), array.dtype, offset=1).reshape(
+            array.shape
+        )
+
+    found = registrar.register(odd(source), odd(depth))
+    np.testing.assert_array_equal(found[0], image)
+    np.testing.assert_array_equal(found[1], mask)
+    with pytest.raises(ValueError, match="out has .*contiguous, aligned and writeable"):
+        registrar.register(source, depth, out=odd(image))
 
 
 def test_integer_depth_needs_its_unit() -> None:
@@ -707,8 +740,9 @@ def test_other_threads_run_meanwhile(frames: list[synthetic.Frame]) -> None:
     assert sum(times[0] < tick < times[-1] for tick in ticks) > 10 * len(times)
 
 
-def test_two_threads_may_register_with_one_registrar() -> None:
-    registrar = Registrar(some_rig(), num_threads=1)
+@pytest.mark.parametrize("num_threads", [1, 3])
+def test_two_threads_may_register_with_one_registrar(num_threads: int) -> None:
+    registrar = Registrar(some_rig(), num_threads)
     depth = some_depth()
     sources = [np.random.default_rng(i).integers(0, 256, (42, 56), np.uint8) for i in range(4)]
     expected = [registrar.register(source, depth)[0] for source in sources]

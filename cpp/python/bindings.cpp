@@ -31,7 +31,10 @@ std::string shape_text(const py::array& array) {
     return text + ") " + std::string(py::str(array.dtype()));
 }
 
-// A view on a numpy array, and the array that owns it (a copy where rows are not contiguous).
+constexpr int kAligned = py::detail::npy_api::NPY_ARRAY_ALIGNED_;
+
+// A view on a numpy array, and the array that owns it (a copy where rows are not contiguous or
+// numbers not aligned).
 struct Held {
     py::array array;
     ImageView view;
@@ -53,7 +56,7 @@ Held image_of(const std::string& name, const py::object& object) {
                               ", expected shape (H, W) or (H, W, 3)");
     if (given.size() == 0) throw py::value_error(name + " has " + shape_text(given) + ", is empty");
     Held held;
-    held.array = py::array::ensure(given, py::array::c_style);
+    held.array = py::array::ensure(given, py::array::c_style | kAligned);
     held.view = {
         held.array.data(),
         static_cast<int>(held.array.shape(1)),
@@ -78,9 +81,10 @@ Held depth_of(const std::string& name, const py::object& object, bool unit_known
     return image_of(name, given);
 }
 
-// The caller's array to write to, or a new one.
+// The caller's array to write to, which shares nothing with `others`, or a new one.
 py::array result_of(const char* name, const py::object& object, const py::dtype& dtype,
-                    const std::vector<py::ssize_t>& shape) {
+                    const std::vector<py::ssize_t>& shape,
+                    std::initializer_list<std::pair<const char*, const py::array&>> others) {
     if (object.is_none()) return py::array(dtype, shape);
     if (!py::isinstance<py::array>(object))
         throw py::value_error(std::string(name) + " is not a numpy array");
@@ -88,9 +92,17 @@ py::array result_of(const char* name, const py::object& object, const py::dtype&
     const bool fits =
         std::equal(shape.begin(), shape.end(), given.shape(), given.shape() + given.ndim()) &&
         given.dtype().equal(dtype);
-    if (!fits || !given.writeable() || !(given.flags() & py::array::c_style))
+    constexpr int kFlags = py::array::c_style | kAligned;
+    if (!fits || !given.writeable() || (given.flags() & kFlags) != kFlags)
         throw py::value_error(std::string(name) + " has " + shape_text(given) + ", expected " +
-                              shape_text(py::array(dtype, shape)) + ", contiguous and writeable");
+                              shape_text(py::array(dtype, shape)) +
+                              ", contiguous, aligned and writeable");
+    const auto begin = [](const py::array& a) { return static_cast<const char*>(a.data()); };
+    for (const auto& [other, array] : others)
+        if (begin(given) < begin(array) + array.nbytes() &&
+            begin(array) < begin(given) + given.nbytes())
+            throw py::value_error(std::string(name) + " overlaps " + other +
+                                  ", expected memory of its own");
     return given;
 }
 
@@ -588,7 +600,7 @@ references, sources: sequences of (H, W) or (H, W, 3) uint8 | uint16 | float32 i
 index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN / inf unknown.
 initial: Rig to start from. progress: called with (stage, share of the work done). flow: a
 provider as in xcalib.flow, for the flow term; None is the built-in patch flow.
-Images are copied only where their rows are not contiguous.
+Images are copied only where they are not contiguous and aligned.
 
 Raises ValueError, naming the frame, on unusable input. Not to converge is a result:
 see CalibrationResult.converged.)");
@@ -635,9 +647,12 @@ refuses integers. Raises ValueError where the rig or an option is not valid.)")
                 const Held d = depth_of("depth", depth, registrar.options().depth_scale > 0);
                 const Pinhole& grid = registrar.rig().reference;
                 std::vector<py::ssize_t> shape{grid.height, grid.width};
-                py::array codes = result_of("mask", mask, py::dtype::of<std::uint8_t>(), shape);
+                py::array codes = result_of("mask", mask, py::dtype::of<std::uint8_t>(), shape,
+                                            {{"source", s.array}, {"depth", d.array}});
                 if (s.array.ndim() == 3) shape.push_back(s.array.shape(2));
-                py::array image = result_of("out", out, s.array.dtype(), shape);
+                py::array image =
+                    result_of("out", out, s.array.dtype(), shape,
+                              {{"source", s.array}, {"depth", d.array}, {"mask", codes}});
                 const MutableImageView pixels{
                     image.mutable_data(),
                     grid.width,
@@ -658,7 +673,7 @@ refuses integers. Raises ValueError where the rig or an option is not valid.)")
 
 source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth: (h, w) float32
 [m], or uint16 if depth_scale was given, of the reference's aspect. out, mask: contiguous arrays to
-write the results to, which must not overlap the others; else new ones are made, which for large
+write the results to, which overlap no other; else new ones are made, which for large
 images takes as long as filling them. Returns (image, mask): image (H, W[, 3]) in the source's
 dtype, 0 where not valid; mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
 Raises ValueError with shapes and dtypes.)");

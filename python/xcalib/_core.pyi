@@ -342,7 +342,7 @@ def calibrate(
     pairs by index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN /
     inf unknown. initial: Rig to start from. progress: called with (stage, share of the work
     done). flow: a provider as in xcalib.flow, for the flow term; None is the built-in patch
-    flow. Images are copied only where their rows are not contiguous.
+    flow. Images are copied only where they are not contiguous and aligned.
 
     Raises ValueError, naming the frame, on unusable input. Not to converge is a result: see
     CalibrationResult.converged.
@@ -384,11 +384,11 @@ class Registrar:
 
         source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth:
         (h, w) float32 [m], or uint16 if depth_scale was given, of the reference's aspect.
-        out, mask: contiguous arrays to write the results to, which must not overlap the
-        others; else new ones are made, which for large images takes as long as filling them.
-        Returns (image, mask): image (H, W[, 3]) in the source's dtype, 0 where not valid;
-        mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth. Raises
-        ValueError with shapes and dtypes.
+        out, mask: contiguous arrays to write the results to, which overlap no other; else
+        new ones are made, which for large images takes as long as filling them. Returns
+        (image, mask): image (H, W[, 3]) in the source's dtype, 0 where not valid; mask (H, W)
+        uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth. Raises ValueError with
+        shapes and dtypes.
         """
 
 def nec(
