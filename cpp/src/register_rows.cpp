@@ -220,23 +220,26 @@ void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begi
     };
     for (int y = begin; y < end; ++y) {
         const Nearness* row = parts + static_cast<std::size_t>(y) * width;
-        // Beyond the border lies the row itself, which fills nothing.
+        // Beyond the border lies the row, or the cell, itself, which fills nothing.
         const Nearness* above = y > 0 ? row - width : row;
         const Nearness* below = y + 1 < grid.height ? row + width : row;
         Nearness* to = out + static_cast<std::size_t>(y) * width;
+        const auto join_one = [&](int x) {
+            const Nearness here = nearest_one(row + x);
+            const Nearness left = x > 0 ? nearest_one(row + x - 1) : here;
+            const Nearness right = x + 1 < width ? nearest_one(row + x + 1) : here;
+            const Nearness across = std::min(left, right);
+            const Nearness along = std::min(nearest_one(above + x), nearest_one(below + x));
+            to[x] = std::max(here, std::max(across, along));
+        };
         int x = 1;
-        to[0] = nearest_one(row);
+        join_one(0);
         for (; x + lanes < width; x += lanes) {
             const Cells across = hn::Min(nearest(row + x - 1), nearest(row + x + 1));
             const Cells along = hn::Min(nearest(above + x), nearest(below + x));
             hn::StoreU(hn::Max(nearest(row + x), hn::Max(across, along)), d, to + x);
         }
-        for (; x < width; ++x) {
-            const Nearness right = x + 1 < width ? nearest_one(row + x + 1) : nearest_one(row + x);
-            const Nearness across = std::min(nearest_one(row + x - 1), right);
-            const Nearness along = std::min(nearest_one(above + x), nearest_one(below + x));
-            to[x] = std::max(nearest_one(row + x), std::max(across, along));
-        }
+        for (; x < width; ++x) join_one(x);
     }
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "refusal.hpp"
+#include "register_rows.hpp"
 #include "scenes.hpp"
 #include "xcalib/register.hpp"
 
@@ -172,6 +173,33 @@ TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
     }
     hwy::SetSupportedTargetsForTest(0);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+TEST(Occlusion, GapsBetweenTheCellsOfASurfaceAreFilled) {
+    std::mt19937 random(2);
+    for (const int width : {2, 3, 17, 33, 40, 70}) {
+        CellGrid grid;
+        grid.width = width;
+        grid.height = 5;
+        const std::size_t size = cells_with_room(grid);
+        std::vector<Nearness> parts(2 * size), joined(size, 9);
+        for (Nearness& cell : parts) cell = static_cast<Nearness>(random() % 1000);
+        join_cells(grid, parts.data(), 2, 0, 2, joined.data());
+        join_cells(grid, parts.data(), 2, 2, 5, joined.data());
+        const auto nearest = [&](int x, int y) {
+            const std::size_t i = static_cast<std::size_t>(y) * width + x;
+            return std::max(parts[i], parts[i + size]);
+        };
+        for (int y = 0; y < 5; ++y)
+            for (int x = 0; x < width; ++x) {
+                Nearness expected = nearest(x, y);
+                if (x > 0 && x + 1 < width)
+                    expected = std::max(expected, std::min(nearest(x - 1, y), nearest(x + 1, y)));
+                if (y > 0 && y < 4)
+                    expected = std::max(expected, std::min(nearest(x, y - 1), nearest(x, y + 1)));
+                ASSERT_EQ(joined[y * width + x], expected) << x << ", " << y << " of " << width;
+            }
+    }
 }
 
 TEST(Occlusion, TheMapHasNoPlaceForWhatIsHidden) {
