@@ -72,7 +72,7 @@ def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object
     mask = np.empty((HEIGHT, WIDTH), np.uint8)
 
     def ours(image: np.ndarray, **options: object) -> Callable[[np.ndarray, int], object]:
-        registrar = xcalib.Registrar(rig, **{"num_threads": 1, "occlusion": False, **options})
+        registrar = xcalib.Registrar(rig, **{"num_threads": 1, "occlusion": "ignore", **options})
         out = np.empty((HEIGHT, WIDTH, *image.shape[2:]), image.dtype)
         return lambda depth, _: registrar.register(image, depth, out=out, mask=mask)
 
@@ -91,9 +91,9 @@ def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object
     kitti = ours(source, depth_scale=1 / 256)
     calls: dict[str, Callable[[np.ndarray, int], object]] = {
         "float32": ours(source),
-        "float32, occlusion": ours(source, occlusion=True),
+        "float32, occlusion": ours(source, occlusion="mark"),
         "float32, two threads": ours(source, num_threads=2),
-        "float32, occlusion, two threads": ours(source, occlusion=True, num_threads=2),
+        "float32, occlusion, two threads": ours(source, occlusion="mark", num_threads=2),
         "float32, uint16 depth": lambda _, i: kitti(units[i], i),
         "uint8": ours(counts),
         "uint16": ours(wide),

@@ -285,7 +285,7 @@ def some_depth(shape: tuple[int, int] = (48, 64)) -> Array:
 
 def test_map_is_the_equation_of_the_paper() -> None:
     rig, depth = some_rig(), some_depth()
-    found = Registrar(rig, occlusion=False).map(depth)
+    found = Registrar(rig, occlusion="ignore").map(depth)
     assert found.shape == (48, 64, 2) and found.dtype == np.float32
     expected = mapped(rig, depth)
     inside = (expected > 1e-3).all(-1) & (expected < (55 - 1e-3, 41 - 1e-3)).all(-1)
@@ -304,12 +304,13 @@ def test_register_keeps_type_and_channels(
     rig, depth = some_rig(), some_depth()
     rng = np.random.default_rng(2)
     source = rng.uniform(0, 200, (42, 56, *channels)).astype(dtype)
-    image, mask = Registrar(rig).register(source, depth)
+    registrar = Registrar(rig, occlusion="hide")
+    image, mask = registrar.register(source, depth)
     assert (mask == 2).any()  # of depths drawn at random
     assert image.dtype == dtype and image.shape == (48, 64, *channels)
     assert mask.dtype == np.uint8 and mask.shape == (48, 64)
     assert (mask[5, 5:9] == 3).all() and set(np.unique(mask)) == {0, 1, 2, 3}
-    places = Registrar(rig).map(depth)
+    places = registrar.map(depth)
     np.testing.assert_array_equal(mask == 0, np.isfinite(places).all(-1))
     assert not image[mask != 0].any()
     x, y = np.moveaxis(places[mask == 0].astype(np.float64), -1, 0)
@@ -357,13 +358,46 @@ def test_results_may_go_to_arrays_of_the_caller() -> None:
         registrar.register(source, depth, out=codes)
     with pytest.raises(ValueError, match=r"mask has shape \(48, 64\) float32, expected .* uint8"):
         registrar.register(source, depth, mask=depth)
-    with pytest.raises(ValueError, match=r"out has .*contiguous and writeable"):
+    with pytest.raises(ValueError, match=r"out has .*contiguous, aligned and writeable"):
         registrar.register(source, depth, out=np.empty((48, 64, 6), np.uint8)[..., ::2])
     out.flags.writeable = False
-    with pytest.raises(ValueError, match=r"out has .*contiguous and writeable"):
+    with pytest.raises(ValueError, match=r"out has .*contiguous, aligned and writeable"):
         registrar.register(source, depth, out=out)
     with pytest.raises(ValueError, match="mask is not a numpy array"):
         registrar.register(source, depth, mask=[0])
+
+
+def test_results_may_not_go_to_what_is_read() -> None:
+    pinhole = Pinhole.from_hfov(64, 48, 45)
+    registrar, depth = Registrar(Rig(pinhole, pinhole)), some_depth()
+    source = np.random.default_rng(6).integers(0, 256, (48, 64), np.uint8)
+    for name, other, arrays in [
+        ("out", "source", {"out": source}),
+        ("mask", "source", {"mask": source}),
+        ("mask", "depth", {"mask": depth.view(np.uint8).reshape(-1, 64)[48:96]}),
+        ("out", "mask", dict.fromkeys(("out", "mask"), np.empty_like(source))),
+    ]:
+        with pytest.raises(ValueError, match=f"{name} overlaps {other}, expected memory of its"):
+            registrar.register(source, depth, **arrays)
+    both = np.empty((96, 64), np.uint8)  # side by side is fine
+    registrar.register(source, depth, out=both[:48], mask=both[48:])
+
+
+def test_numbers_need_not_be_aligned_where_they_are_read() -> None:
+    registrar, depth = Registrar(some_rig()), some_depth()
+    source = np.random.default_rng(8).integers(0, 65536, (42, 56), np.uint16)
+    image, mask = registrar.register(source, depth)
+
+    def odd(array: np.ndarray) -> np.ndarray:
+        return np.frombuffer(bytearray(b"?" + array.tobytes()), array.dtype, offset=1).reshape(
+            array.shape
+        )
+
+    found = registrar.register(odd(source), odd(depth))
+    np.testing.assert_array_equal(found[0], image)
+    np.testing.assert_array_equal(found[1], mask)
+    with pytest.raises(ValueError, match=r"out has .*contiguous, aligned and writeable"):
+        registrar.register(source, depth, out=odd(image))
 
 
 def test_integer_depth_needs_its_unit() -> None:
@@ -401,7 +435,7 @@ def test_occlusion_is_what_the_rays_of_a_rendered_street_say(t: tuple[float, ...
     depth = depth.astype(np.float32)
     source = np.ones((512, 640), np.uint8)
     _, mask = Registrar(street.rig).register(source, depth)
-    _, seen = Registrar(street.rig, occlusion=False).register(source, depth)
+    _, seen = Registrar(street.rig, occlusion="ignore").register(source, depth)
     np.testing.assert_array_equal(mask[mask != 2], seen[mask != 2])
     known = seen == 0
     hidden = street.occluded(1) & known
@@ -707,8 +741,9 @@ def test_other_threads_run_meanwhile(frames: list[synthetic.Frame]) -> None:
     assert sum(times[0] < tick < times[-1] for tick in ticks) > 10 * len(times)
 
 
-def test_two_threads_may_register_with_one_registrar() -> None:
-    registrar = Registrar(some_rig(), num_threads=1)
+@pytest.mark.parametrize("num_threads", [1, 3])
+def test_two_threads_may_register_with_one_registrar(num_threads: int) -> None:
+    registrar = Registrar(some_rig(), num_threads)
     depth = some_depth()
     sources = [np.random.default_rng(i).integers(0, 256, (42, 56), np.uint8) for i in range(4)]
     expected = [registrar.register(source, depth)[0] for source in sources]

@@ -525,3 +525,19 @@ def test_errors_of_the_core_name_the_file(
 
     monkeypatch.setattr(pipeline, "calibrate", fail)
     assert str(files(scene / "visible")[2]) in refused(*calibration(scene))
+
+
+def test_occluded_pixels_are_black_on_request(rendered: Path, tmp_path: Path) -> None:
+    images = {}
+    for occlusion in ("mark", "hide"):
+        out = tmp_path / occlusion
+        arguments = ("register", rendered / "rig.yaml", *folders(rendered), "-o", out)
+        assert run(*arguments, "--occlusion", occlusion).exit_code == 0
+        images[occlusion] = read_image(files(out)[0]), read_image(files(out / "masks")[0])
+    (marked, mask), (hidden, same) = images["mark"], images["hide"]
+    np.testing.assert_array_equal(mask, same)
+    occluded = mask == 2
+    assert occluded.any()
+    assert (hidden[occluded] == 0).all()
+    assert (marked[occluded] > 0).mean() > 0.9
+    np.testing.assert_array_equal(marked[~occluded], hidden[~occluded])

@@ -62,7 +62,8 @@ def mapping_error(rig: Rig, scene: Path) -> float:
         r = np.round(255 / NEAREST / depth) / 255
         scaled = (1 / np.maximum(relative.scale * r + relative.shift, 1e-4)).astype(np.float32)
         maps: list[NDArray[np.float32]] = [
-            Registrar(one, occlusion=False).map(of) for one, of in ((rig, scaled), (truth, depth))
+            Registrar(one, occlusion="ignore").map(of)
+            for one, of in ((rig, scaled), (truth, depth))
         ]
         errors.append(np.linalg.norm(maps[0] - maps[1], axis=-1))
     return float(np.nanmedian(np.stack(errors)))
@@ -118,8 +119,8 @@ def test_arrays_of_relative_depth(rendered: Path) -> None:
     errors = []
     for depth in depths:
         scaled = 1 / (relative.scale / depth + relative.shift)
-        maps = [Registrar(rig, occlusion=False).map(scaled.astype(np.float32))]
-        maps.append(Registrar(truth, occlusion=False).map(depth))
+        maps = [Registrar(rig, occlusion="ignore").map(scaled.astype(np.float32))]
+        maps.append(Registrar(truth, occlusion="ignore").map(depth))
         errors.append(np.linalg.norm(maps[0] - maps[1], axis=-1))
     assert np.nanmedian(np.stack(errors)) < 0.5
     assert Rig(truth.reference, truth.source).relative_depth is None

@@ -31,7 +31,10 @@ std::string shape_text(const py::array& array) {
     return text + ") " + std::string(py::str(array.dtype()));
 }
 
-// A view on a numpy array, and the array that owns it (a copy where rows are not contiguous).
+constexpr int kAligned = py::detail::npy_api::NPY_ARRAY_ALIGNED_;
+
+// A view on a numpy array, and the array that owns it (a copy where rows are not contiguous or
+// numbers not aligned).
 struct Held {
     py::array array;
     ImageView view;
@@ -53,7 +56,7 @@ Held image_of(const std::string& name, const py::object& object) {
                               ", expected shape (H, W) or (H, W, 3)");
     if (given.size() == 0) throw py::value_error(name + " has " + shape_text(given) + ", is empty");
     Held held;
-    held.array = py::array::ensure(given, py::array::c_style);
+    held.array = py::array::ensure(given, py::array::c_style | kAligned);
     held.view = {
         held.array.data(),
         static_cast<int>(held.array.shape(1)),
@@ -78,9 +81,10 @@ Held depth_of(const std::string& name, const py::object& object, bool unit_known
     return image_of(name, given);
 }
 
-// The caller's array to write to, or a new one.
+// The caller's array to write to, which shares nothing with `others`, or a new one.
 py::array result_of(const char* name, const py::object& object, const py::dtype& dtype,
-                    const std::vector<py::ssize_t>& shape) {
+                    const std::vector<py::ssize_t>& shape,
+                    std::initializer_list<std::pair<const char*, const py::array&>> others) {
     if (object.is_none()) return py::array(dtype, shape);
     if (!py::isinstance<py::array>(object))
         throw py::value_error(std::string(name) + " is not a numpy array");
@@ -88,9 +92,17 @@ py::array result_of(const char* name, const py::object& object, const py::dtype&
     const bool fits =
         std::equal(shape.begin(), shape.end(), given.shape(), given.shape() + given.ndim()) &&
         given.dtype().equal(dtype);
-    if (!fits || !given.writeable() || !(given.flags() & py::array::c_style))
+    constexpr int kFlags = py::array::c_style | kAligned;
+    if (!fits || !given.writeable() || (given.flags() & kFlags) != kFlags)
         throw py::value_error(std::string(name) + " has " + shape_text(given) + ", expected " +
-                              shape_text(py::array(dtype, shape)) + ", contiguous and writeable");
+                              shape_text(py::array(dtype, shape)) +
+                              ", contiguous, aligned and writeable");
+    const auto begin = [](const py::array& a) { return static_cast<const char*>(a.data()); };
+    for (const auto& [other, array] : others)
+        if (begin(given) < begin(array) + array.nbytes() &&
+            begin(array) < begin(given) + given.nbytes())
+            throw py::value_error(std::string(name) + " overlaps " + other +
+                                  ", expected memory of its own");
     return given;
 }
 
@@ -237,6 +249,8 @@ const Words<SearchMode> kSearchModes = {{SearchMode::automatic, "auto"},
                                         {SearchMode::off, "off"}};
 const Words<FlowMode> kFlowModes = {
     {FlowMode::automatic, "auto"}, {FlowMode::on, "on"}, {FlowMode::off, "off"}};
+const Words<Occlusion> kOcclusions = {
+    {Occlusion::ignore, "ignore"}, {Occlusion::mark, "mark"}, {Occlusion::hide, "hide"}};
 const Words<Solver> kSolvers = {{Solver::ceres, "ceres"}, {Solver::adam, "adam"}};
 
 template <class Value>
@@ -475,7 +489,8 @@ A rig that was calibrated with it has its translation in the unit that the scale
             [](CalibrationOptions& o, const std::string& word) {
                 o.flow = value_of("flow", word, kFlowModes);
             },
-            "The flow term: 'auto' (where nothing is searched), 'on' or 'off'.")
+            "The flow term: 'auto' (where nothing is searched), 'on' (after a search too) or "
+            "'off'.")
         .def_readwrite("flow_weight", &CalibrationOptions::flow_weight,
                        "lambda of Eq. (total_loss); > 0.")
         .def_readwrite("flow_rounds", &CalibrationOptions::flow_rounds,
@@ -487,7 +502,8 @@ A rig that was calibrated with it has its translation in the unit that the scale
         .def_readwrite("reference_hfov_deg", &CalibrationOptions::reference_hfov_deg,
                        "Horizontal field of view to assume [deg], or None to search it.")
         .def_readwrite("optimize_reference", &CalibrationOptions::optimize_reference,
-                       "Free the reference's intrinsics too; they are coupled with the source's.")
+                       "Free the reference's intrinsics too; they are coupled with the source's. "
+                       "The solver 'adam' always does.")
         .def_readwrite("relative_depth", &CalibrationOptions::relative_depth,
                        "RelativeDepth that the depth maps were made with: the shift is estimated, "
                        "the scale kept, and the rig has both. None: metric depth.")
@@ -509,7 +525,7 @@ A rig that was calibrated with it has its translation in the unit that the scale
         .def_readonly("height", &LevelReport::height, "[px]")
         .def_readonly("iterations", &LevelReport::iterations, "Of Levenberg-Marquardt.")
         .def_readonly("initial_cost", &LevelReport::initial_cost,
-                      "Eq. (image_loss), and the prior in stage 1.")
+                      "Eq. (image_loss), and, where they act, the flow term and the prior.")
         .def_readonly("final_cost", &LevelReport::final_cost, "The same at the end.")
         .def_readonly("nec", &LevelReport::nec, "Mean over the pairs, weighted by c_i.")
         .def_readonly("aligned", &LevelReport::aligned, "The same, beyond what chance gives.")
@@ -610,7 +626,7 @@ references, sources: sequences of (H, W) or (H, W, 3) uint8 | uint16 | float32 i
 index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN / inf unknown.
 initial: Rig to start from. progress: called with (stage, share of the work done). flow: a
 provider as in xcalib.flow, for the flow term; None is the built-in patch flow.
-Images are copied only where their rows are not contiguous.
+Images are copied only where they are not contiguous and aligned.
 
 Raises ValueError, naming the frame, on unusable input. Not to converge is a result:
 see CalibrationResult.converged.)");
@@ -618,19 +634,22 @@ see CalibrationResult.converged.)");
     py::class_<Registrar>(m, "Registrar", R"(One rig, a stream of frames, Eq. (warping).
 
 num_threads: 0 uses every core. nearest: register() takes the source pixel next to the point as it
-is, instead of interpolating between four, so that radiometric counts are never mixed. occlusion:
-mask what the source camera sees something nearer in front of; without it, a near object's edge
-appears twice. depth_scale: metres per unit of uint16 depth (1 / 256 is KITTI's), 0 unknown; None
+is, instead of interpolating between four, so that radiometric counts are never mixed. occlusion,
+what the source camera sees something nearer in front of: "mark" gives it mask code 2, and the image
+shows what is in front; "hide" makes it 0 in the image and NaN in the map too, so that nothing is
+seen twice; "ignore" does not look for it. depth_scale: metres per unit of uint16 depth (1 / 256 is KITTI's), 0 unknown; None
 refuses integers. Raises ValueError where the rig or an option is not valid.)")
-        .def(py::init([](const Rig& rig, int num_threads, bool nearest, bool occlusion,
-                         const std::optional<double>& depth_scale) {
+        .def(py::init([](const Rig& rig, int num_threads, bool nearest,
+                         const std::string& occlusion, const std::optional<double>& depth_scale) {
                  if (depth_scale && !(std::isfinite(*depth_scale) && *depth_scale > 0))
                      throw py::value_error("depth_scale is " + std::to_string(*depth_scale) +
                                            ", expected metres per unit, > 0, or None");
-                 return Registrar(rig, {num_threads, nearest, occlusion, depth_scale.value_or(0)});
+                 return Registrar(
+                     rig, {num_threads, nearest, value_of("occlusion", occlusion, kOcclusions),
+                           depth_scale.value_or(0)});
              }),
              py::arg("rig"), py::arg("num_threads") = 0, py::arg("nearest") = false,
-             py::arg("occlusion") = true, py::arg("depth_scale") = py::none())
+             py::arg("occlusion") = "mark", py::arg("depth_scale") = py::none())
         .def_property_readonly("rig", &Registrar::rig, "A copy of the rig.",
                                py::return_value_policy::copy)
         .def(
@@ -657,9 +676,12 @@ refuses integers. Raises ValueError where the rig or an option is not valid.)")
                 const Held d = depth_of("depth", depth, registrar.options().depth_scale > 0);
                 const Pinhole& grid = registrar.rig().reference;
                 std::vector<py::ssize_t> shape{grid.height, grid.width};
-                py::array codes = result_of("mask", mask, py::dtype::of<std::uint8_t>(), shape);
+                py::array codes = result_of("mask", mask, py::dtype::of<std::uint8_t>(), shape,
+                                            {{"source", s.array}, {"depth", d.array}});
                 if (s.array.ndim() == 3) shape.push_back(s.array.shape(2));
-                py::array image = result_of("out", out, s.array.dtype(), shape);
+                py::array image =
+                    result_of("out", out, s.array.dtype(), shape,
+                              {{"source", s.array}, {"depth", d.array}, {"mask", codes}});
                 const MutableImageView pixels{
                     image.mutable_data(),
                     grid.width,
@@ -680,9 +702,10 @@ refuses integers. Raises ValueError where the rig or an option is not valid.)")
 
 source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth: (h, w) float32
 [m], or uint16 if depth_scale was given, of the reference's aspect. out, mask: contiguous arrays to
-write the results to, which must not overlap the others; else new ones are made, which for large
+write the results to, which overlap no other; else new ones are made, which for large
 images takes as long as filling them. Returns (image, mask): image (H, W[, 3]) in the source's
-dtype, 0 where not valid; mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
+dtype, 0 where not valid, unless marked as occluded only; mask (H, W) uint8: 0 valid, 1 outside the
+source, 2 occluded, 3 no depth.
 Raises ValueError with shapes and dtypes.)");
 
     m.def(

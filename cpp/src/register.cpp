@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
@@ -64,7 +65,7 @@ struct Registrar::Stream {
     Stream(const Rig& rig, const RegistrarOptions& options)
         : grid(rig), parts(std::min(resolve_threads(options.num_threads), kMostParts)),
           // Cameras at one place see the same.
-          occlusion(options.occlusion && rig.t().norm() > 0),
+          occlusion(options.occlusion != Occlusion::ignore && rig.t().norm() > 0),
           workers(resolve_threads(options.num_threads)) {}
 
     std::unique_ptr<Cells> take() {
@@ -85,15 +86,17 @@ struct Registrar::Stream {
     }
 
     // Splats all of the depth, then calls work(cells, begin, end) on all rows of the reference.
+    // `cells` is null where nothing can be hidden, or nobody asks.
     template <class Work>
-    void each_row(const Reprojection& reprojection, const DepthView& depth, const Work& work) {
+    void each_row(const Reprojection& reprojection, const DepthView& depth, bool asked,
+                  const Work& work) {
         std::unique_ptr<Cells> cells;
         const Nearness* joined = nullptr;
         const int height = depth.view.height;
         const auto share = [](int of, int part, int count) {
             return static_cast<int>(static_cast<long>(of) * part / count);
         };
-        if (occlusion) {
+        if (occlusion && asked) {
             cells = take();
             const std::size_t size = cells_with_room(grid);
             workers.each(parts, [&](int part) {
@@ -151,11 +154,13 @@ void Registrar::map(const ImageView& depth, float* out) const {
     task.reprojection = &reprojection_;
     task.depth = on_grid(depth, options_.depth_scale, rig_.reference, room);
     task.grid = &stream_->grid;
-    stream_->each_row(reprojection_, task.depth, [&](const Nearness* cells, int begin, int end) {
-        RowsTask part = task;
-        part.cells = cells;
-        map_rows(part, begin, end, out);
-    });
+    task.hide = options_.occlusion == Occlusion::hide;
+    stream_->each_row(reprojection_, task.depth, task.hide,
+                      [&](const Nearness* cells, int begin, int end) {
+                          RowsTask part = task;
+                          part.cells = cells;
+                          map_rows(part, begin, end, out);
+                      });
 }
 
 void Registrar::register_frame(const ImageView& source, const ImageView& depth,
@@ -171,15 +176,17 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
     task.reprojection = &reprojection_;
     task.depth = on_grid(depth, options_.depth_scale, rig_.reference, room);
     task.grid = &stream_->grid;
+    task.hide = options_.occlusion == Occlusion::hide;
     task.source = source;
     task.nearest = options_.nearest;
     task.registered = registered;
     task.mask = mask;
-    stream_->each_row(reprojection_, task.depth, [&](const Nearness* cells, int begin, int end) {
-        RowsTask part = task;
-        part.cells = cells;
-        register_rows(part, begin, end);
-    });
+    stream_->each_row(reprojection_, task.depth, true,
+                      [&](const Nearness* cells, int begin, int end) {
+                          RowsTask part = task;
+                          part.cells = cells;
+                          register_rows(part, begin, end);
+                      });
 }
 
 }  // namespace xcalib

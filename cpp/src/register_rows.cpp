@@ -220,23 +220,26 @@ void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begi
     };
     for (int y = begin; y < end; ++y) {
         const Nearness* row = parts + static_cast<std::size_t>(y) * width;
-        // Beyond the border lies the row itself, which fills nothing.
+        // Beyond the border lies the row, or the cell, itself, which fills nothing.
         const Nearness* above = y > 0 ? row - width : row;
         const Nearness* below = y + 1 < grid.height ? row + width : row;
         Nearness* to = out + static_cast<std::size_t>(y) * width;
+        const auto join_one = [&](int x) {
+            const Nearness here = nearest_one(row + x);
+            const Nearness left = x > 0 ? nearest_one(row + x - 1) : here;
+            const Nearness right = x + 1 < width ? nearest_one(row + x + 1) : here;
+            const Nearness across = std::min(left, right);
+            const Nearness along = std::min(nearest_one(above + x), nearest_one(below + x));
+            to[x] = std::max(here, std::max(across, along));
+        };
         int x = 1;
-        to[0] = nearest_one(row);
+        join_one(0);
         for (; x + lanes < width; x += lanes) {
             const Cells across = hn::Min(nearest(row + x - 1), nearest(row + x + 1));
             const Cells along = hn::Min(nearest(above + x), nearest(below + x));
             hn::StoreU(hn::Max(nearest(row + x), hn::Max(across, along)), d, to + x);
         }
-        for (; x < width; ++x) {
-            const Nearness right = x + 1 < width ? nearest_one(row + x + 1) : nearest_one(row + x);
-            const Nearness across = std::min(nearest_one(row + x - 1), right);
-            const Nearness along = std::min(nearest_one(above + x), nearest_one(below + x));
-            to[x] = std::max(nearest_one(row + x), std::max(across, along));
-        }
+        for (; x < width; ++x) join_one(x);
     }
 }
 
@@ -435,9 +438,11 @@ HWY_INLINE bool sample_window(const RowsTask& task, const Source& source, Float 
     constexpr int kWindow = window<T>();
     constexpr int kBefore = kWindow / 8;  // left of the first point may be some pixels
     const Whole x = floor_or_below(p.u), y = floor_or_below(p.v);
-    const int row = hn::GetLane(y.integer) - kLargeBits;
-    const int first = hn::GetLane(x.integer) - kLargeBits;
-    const int from = std::max(0, std::min(first - kBefore, source.width - 1 - kWindow));
+    // In vectors, where what is far outside may overflow.
+    const int row = hn::GetLane(hn::Sub(y.integer, set(kLargeBits)));
+    const int first = hn::GetLane(hn::Sub(x.integer, set(kLargeBits)));
+    const int last_from = source.width - 1 - kWindow;
+    const int from = std::clamp(first, kBefore, last_from + kBefore) - kBefore;
     if (static_cast<unsigned>(row) >= static_cast<unsigned>(source.height - 1)) return false;
     const Int index = hn::Sub(x.integer, set(from + kLargeBits));
     const Int apart =
@@ -455,7 +460,7 @@ HWY_INLINE bool sample_window(const RowsTask& task, const Source& source, Float 
         if (!hn::AllFalse(d, gone)) {
             store_codes(hn::IfThenElseZero(hn::RebindMask(di, gone), code_of(Validity::occluded)),
                         mask);
-            values[0] = hn::IfThenZeroElse(gone, values[0]);
+            if (task.hide) values[0] = hn::IfThenZeroElse(gone, values[0]);
         }
     }
     store_pixels(values, out);
@@ -511,12 +516,13 @@ HWY_INLINE void sample(const RowsTask& task, const Source& source, const Row& ro
     Mask valid = confine(row, depth, p);
     Int codes = hn::IfThenElse(hn::RebindMask(di, is_depth(depth)), code_of(Validity::outside),
                                code_of(Validity::no_depth));
+    codes = hn::IfThenZeroElse(hn::RebindMask(di, valid), codes);
     if (task.cells) {
         const Mask gone = hn::And(valid, hidden(*task.grid, task.cells, p));
         codes = hn::IfThenElse(hn::RebindMask(di, gone), code_of(Validity::occluded), codes);
-        valid = hn::AndNot(gone, valid);
+        if (task.hide) valid = hn::AndNot(gone, valid);
     }
-    store_codes(hn::IfThenZeroElse(hn::RebindMask(di, valid), codes), mask);
+    store_codes(codes, mask);
     if (hn::AllFalse(d, valid)) std::fill_n(out, kLanes * kChannels, T{0});
     else if (task.nearest) sample_nearest<T, kChannels>(source, p, valid, out);
     else sample_bilinear<T, kChannels>(source, p, valid, out);
@@ -575,7 +581,8 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
             const Float metres = depth.load(x, width - x);
             Points p = project<true>(row, metres, along);
             Mask valid = confine(row, metres, p);
-            if (task.cells) valid = hn::AndNot(hidden(*task.grid, task.cells, p), valid);
+            if (task.cells && task.hide)
+                valid = hn::AndNot(hidden(*task.grid, task.cells, p), valid);
             hn::Store(hn::IfThenElse(valid, p.u, none), d, u);
             hn::Store(hn::IfThenElse(valid, p.v, none), d, v);
             for (int i = 0; i < std::min(kLanes, width - x); ++i) {

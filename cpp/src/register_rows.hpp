@@ -30,6 +30,7 @@ struct RowsTask {
     DepthView depth;
     const CellGrid* grid;
     const Nearness* cells;
+    bool hide;  // occluded pixels are 0 in the image, and NaN in the map
     ImageView source;
     bool nearest;
     MutableImageView registered;

@@ -166,7 +166,7 @@ class CalibrationOptions:
     prior_weight: float
     """gamma of Eq. (total_loss), in stage 1; >= 0."""
     flow: str
-    """The flow term: 'auto' (where nothing is searched), 'on' or 'off'."""
+    """The flow term: 'auto' (where nothing is searched), 'on' (after a search too) or 'off'."""
     flow_weight: float
     """lambda of Eq. (total_loss); > 0."""
     flow_rounds: int
@@ -178,7 +178,9 @@ class CalibrationOptions:
     reference_hfov_deg: float | None
     """Horizontal field of view to assume [deg], or None to search it."""
     optimize_reference: bool
-    """Free the reference's intrinsics too; they are coupled with the source's."""
+    """Free the reference's intrinsics too; they are coupled with the source's. The solver 'adam'
+    always does.
+    """
     relative_depth: RelativeDepth | None
     """RelativeDepth that the depth maps were made with: the shift is estimated, the scale kept,
     and the rig has both. None: metric depth.
@@ -213,7 +215,7 @@ class LevelReport:
         """Of Levenberg-Marquardt."""
     @property
     def initial_cost(self) -> float:
-        """Eq. (image_loss), and the prior in stage 1."""
+        """Eq. (image_loss), and, where they act, the flow term and the prior."""
     @property
     def final_cost(self) -> float:
         """The same at the end."""
@@ -362,7 +364,7 @@ def calibrate(
     pairs by index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN /
     inf unknown. initial: Rig to start from. progress: called with (stage, share of the work
     done). flow: a provider as in xcalib.flow, for the flow term; None is the built-in patch
-    flow. Images are copied only where their rows are not contiguous.
+    flow. Images are copied only where they are not contiguous and aligned.
 
     Raises ValueError, naming the frame, on unusable input. Not to converge is a result: see
     CalibrationResult.converged.
@@ -373,17 +375,18 @@ class Registrar:
 
     num_threads: 0 uses every core. nearest: register() takes the source pixel next to the
     point as it is, instead of interpolating between four, so that radiometric counts are
-    never mixed. occlusion: mask what the source camera sees something nearer in front of;
-    without it, a near object's edge appears twice. depth_scale: metres per unit of uint16
-    depth (1 / 256 is KITTI's), 0 unknown; None refuses integers. Raises ValueError where the
-    rig or an option is not valid.
+    never mixed. occlusion, what the source camera sees something nearer in front of: "mark"
+    gives it mask code 2, and the image shows what is in front; "hide" makes it 0 in the image
+    and NaN in the map too, so that nothing is seen twice; "ignore" does not look for it.
+    depth_scale: metres per unit of uint16 depth (1 / 256 is KITTI's), 0 unknown; None refuses
+    integers. Raises ValueError where the rig or an option is not valid.
     """
     def __init__(
         self,
         rig: Rig,
         num_threads: int = 0,
         nearest: bool = False,
-        occlusion: bool = True,
+        occlusion: str = "mark",
         depth_scale: float | None = None,
     ) -> None: ...
     @property
@@ -404,11 +407,11 @@ class Registrar:
 
         source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth:
         (h, w) float32 [m], or uint16 if depth_scale was given, of the reference's aspect.
-        out, mask: contiguous arrays to write the results to, which must not overlap the
-        others; else new ones are made, which for large images takes as long as filling them.
-        Returns (image, mask): image (H, W[, 3]) in the source's dtype, 0 where not valid;
-        mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no depth. Raises
-        ValueError with shapes and dtypes.
+        out, mask: contiguous arrays to write the results to, which overlap no other; else new
+        ones are made, which for large images takes as long as filling them. Returns (image,
+        mask): image (H, W[, 3]) in the source's dtype, 0 where not valid, unless marked as
+        occluded only; mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no
+        depth. Raises ValueError with shapes and dtypes.
         """
 
 def nec(

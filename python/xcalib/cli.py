@@ -435,6 +435,13 @@ def finite(value: Any) -> Any:
     help="Take the nearest source pixel as it is: radiometric counts are never mixed."
     "  [default: bilinear]",
 )
+@click.option(
+    "--occlusion",
+    type=click.Choice(["ignore", "mark", "hide"]),
+    default="mark",
+    show_default=True,
+    help="What the source sees something nearer in front of: told by the mask, or black as well.",
+)
 @threads_option
 @quiet_option
 def register_command(
@@ -442,6 +449,7 @@ def register_command(
     output: Path,
     overlays: bool,
     nearest: bool,
+    occlusion: str,
     threads: int,
     quiet: bool,
     **inputs: Any,
@@ -456,7 +464,7 @@ def register_command(
         if Path(inputs[name]).resolve() == output.resolve():
             raise InputError(f"output folder {output} is an input folder, expected another")
     (check_file_writable if is_video(output) else check_folder_writable)(output)
-    total = run_registration(frames, rig, output, threads, overlays, quiet, nearest)
+    total = run_registration(frames, rig, output, threads, overlays, quiet, nearest, occlusion)
     click.echo(f"{total.summary()}: {output}")
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")

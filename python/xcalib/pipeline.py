@@ -309,13 +309,15 @@ def run_registration(
     overlays: bool = False,
     quiet: bool = False,
     nearest: bool = False,
+    occlusion: str = "mark",
 ) -> Registration:
     """Register frame by frame and write images, masks and, if asked for, overlays.
 
     ``output`` is a folder, or a video by its suffix, at the rate of the reference. ``nearest``
-    keeps the source's values as they are instead of interpolating between them.
+    keeps the source's values as they are instead of interpolating between them; ``occlusion`` is
+    that of `Registrar`.
     """
-    registrar = Registrar(frames.fit(rig), threads, nearest)
+    registrar = Registrar(frames.fit(rig), threads, nearest, occlusion)
     total = Registration()
     start = time.perf_counter()
     with open_sink(output, frame_rate(frames.references)) as sink:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "refusal.hpp"
+#include "register_rows.hpp"
 #include "scenes.hpp"
 #include "xcalib/register.hpp"
 
@@ -105,8 +106,10 @@ TEST(Occlusion, IsWhatTheRaysSay) {
         const Rig rig = rig_at(c.position, c.width, c.height, c.hfov);
         const Rendered scene = rendered(rig);
         const Image source(c.width, c.height, 1.0f);
-        const Registered all = registered(rig, source, scene.depth, {1, false, false, 0});
-        const Registered found = registered(rig, source, scene.depth, {1, false, true, 0});
+        const Registered all =
+            registered(rig, source, scene.depth, {1, false, Occlusion::ignore, 0});
+        const Registered found =
+            registered(rig, source, scene.depth, {1, false, Occlusion::hide, 0});
         int hidden = 0, visible = 0, hits = 0, lost = 0;
         for (int i = 0; i < kWidth * kHeight; ++i) {
             if (all.mask[i] != 0) {
@@ -126,6 +129,39 @@ TEST(Occlusion, IsWhatTheRaysSay) {
     }
 }
 
+TEST(Occlusion, MarkedPixelsKeepWhatTheSourceShowsThere) {
+    const Rig rig = rig_at({0.3, 0.01, 0.02}, 320, 256, 0.85);
+    const Rendered scene = rendered(rig);
+    Image source(320, 256);
+    for (std::size_t i = 0; i < source.pixels.size(); ++i)
+        source.pixels[i] = static_cast<float>(1 + i % 7);
+    const auto with = [&](Occlusion occlusion, bool nearest) {
+        return registered(rig, source, scene.depth, {2, nearest, occlusion, 0});
+    };
+    std::vector<float> marked_map(2 * kWidth * kHeight), map = marked_map, hidden_map = map;
+    Registrar(rig, {2, false, Occlusion::ignore, 0}).map(scene.depth.view(), map.data());
+    Registrar(rig, {2, false, Occlusion::mark, 0}).map(scene.depth.view(), marked_map.data());
+    Registrar(rig, {2, false, Occlusion::hide, 0}).map(scene.depth.view(), hidden_map.data());
+    for (const bool nearest : {false, true}) {
+        const Registered all = with(Occlusion::ignore, nearest);
+        const Registered marked = with(Occlusion::mark, nearest);
+        const Registered hidden = with(Occlusion::hide, nearest);
+        int count = 0;
+        for (int i = 0; i < kWidth * kHeight; ++i) {
+            ASSERT_EQ(marked.mask[i], hidden.mask[i]);
+            ASSERT_EQ(marked.image[i], all.image[i]);
+            const bool gone = marked.mask[i] == kOccluded;
+            ASSERT_EQ(hidden.image[i], gone ? 0.0f : all.image[i]);
+            ASSERT_EQ(std::isnan(hidden_map[2 * i]), gone || std::isnan(map[2 * i]));
+            if (!std::isnan(map[2 * i])) {
+                ASSERT_EQ(marked_map[2 * i], map[2 * i]);
+            }
+            count += gone;
+        }
+        EXPECT_GT(count, 1000);
+    }
+}
+
 TEST(Occlusion, NothingHidesOnOneSurface) {
     for (const Eigen::Vector3d& position : {Eigen::Vector3d(0.3, 0, 0), Eigen::Vector3d(0, -0.3, 0),
                                             Eigen::Vector3d(0.2, 0.2, 0.3)}) {
@@ -135,7 +171,8 @@ TEST(Occlusion, NothingHidesOnOneSurface) {
         for (int y = 0; y < kHeight; ++y)
             for (int x = 0; x < kWidth; ++x)
                 road.row(y)[x] = y > 250 ? static_cast<float>(1.5 * 600 / (y - 249)) : 0.0f;
-        const Registered out = registered(rig, Image(320, 256, 1.0f), road, {1, false, true, 0});
+        const Registered out =
+            registered(rig, Image(320, 256, 1.0f), road, {1, false, Occlusion::hide, 0});
         EXPECT_EQ(std::count(out.mask.begin(), out.mask.end(), kOccluded), 0) << position;
     }
 }
@@ -143,7 +180,7 @@ TEST(Occlusion, NothingHidesOnOneSurface) {
 TEST(Occlusion, CamerasAtOnePlaceSeeTheSame) {
     const Rig rig = rig_at({0, 0, 0}, 320, 256, 0.9);
     const Registered out =
-        registered(rig, Image(320, 256, 1.0f), rendered(rig).depth, {1, false, true, 0});
+        registered(rig, Image(320, 256, 1.0f), rendered(rig).depth, {1, false, Occlusion::hide, 0});
     for (const std::uint8_t code : out.mask) ASSERT_NE(code, kOccluded);
 }
 
@@ -153,9 +190,11 @@ TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
     std::mt19937 random(1);
     Image source(320, 256);
     for (float& value : source.pixels) value = static_cast<float>(uniform(random, 0, 1));
-    const Registered expected = registered(rig, source, scene.depth, {1, false, true, 0});
+    const Registered expected =
+        registered(rig, source, scene.depth, {1, false, Occlusion::hide, 0});
     for (const int threads : {2, 3, 16, 0}) {
-        const Registered out = registered(rig, source, scene.depth, {threads, false, true, 0});
+        const Registered out =
+            registered(rig, source, scene.depth, {threads, false, Occlusion::hide, 0});
         EXPECT_EQ(out.mask, expected.mask) << threads << " threads";
         EXPECT_EQ(out.image, expected.image) << threads << " threads";
     }
@@ -164,7 +203,7 @@ TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
         const std::int64_t target = targets & -targets;
         hwy::SetSupportedTargetsForTest(target);
         hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-        const Registered out = registered(rig, source, scene.depth, {1, false, true, 0});
+        const Registered out = registered(rig, source, scene.depth, {1, false, Occlusion::hide, 0});
         // How many pixels are splat at once depends on the vector's length.
         int differ = 0;
         for (std::size_t i = 0; i < out.mask.size(); ++i) differ += out.mask[i] != expected.mask[i];
@@ -174,12 +213,40 @@ TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
+TEST(Occlusion, GapsBetweenTheCellsOfASurfaceAreFilled) {
+    std::mt19937 random(2);
+    for (const int width : {2, 3, 17, 33, 40, 70}) {
+        CellGrid grid;
+        grid.width = width;
+        grid.height = 5;
+        const std::size_t size = cells_with_room(grid);
+        std::vector<Nearness> parts(2 * size), joined(size, 9);
+        for (Nearness& cell : parts) cell = static_cast<Nearness>(random() % 1000);
+        join_cells(grid, parts.data(), 2, 0, 2, joined.data());
+        join_cells(grid, parts.data(), 2, 2, 5, joined.data());
+        const auto nearest = [&](int x, int y) {
+            const std::size_t i = static_cast<std::size_t>(y) * width + x;
+            return std::max(parts[i], parts[i + size]);
+        };
+        for (int y = 0; y < 5; ++y)
+            for (int x = 0; x < width; ++x) {
+                Nearness expected = nearest(x, y);
+                if (x > 0 && x + 1 < width)
+                    expected = std::max(expected, std::min(nearest(x - 1, y), nearest(x + 1, y)));
+                if (y > 0 && y < 4)
+                    expected = std::max(expected, std::min(nearest(x, y - 1), nearest(x, y + 1)));
+                ASSERT_EQ(joined[y * width + x], expected) << x << ", " << y << " of " << width;
+            }
+    }
+}
+
 TEST(Occlusion, TheMapHasNoPlaceForWhatIsHidden) {
     const Rig rig = rig_at({0.3, 0.02, 0.05}, 320, 256, 0.85);
     const Rendered scene = rendered(rig);
-    const Registered out = registered(rig, Image(320, 256, 1.0f), scene.depth, {1, false, true, 0});
+    const Registered out =
+        registered(rig, Image(320, 256, 1.0f), scene.depth, {1, false, Occlusion::hide, 0});
     std::vector<float> map(2 * kWidth * kHeight);
-    Registrar(rig, {2, false, true, 0}).map(scene.depth.view(), map.data());
+    Registrar(rig, {2, false, Occlusion::hide, 0}).map(scene.depth.view(), map.data());
     for (int i = 0; i < kWidth * kHeight; ++i)
         ASSERT_EQ(std::isnan(map[2 * i]), out.mask[i] != 0) << i;
 }

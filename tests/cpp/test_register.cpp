@@ -56,8 +56,8 @@ Pixels<T> random_pixels(std::mt19937& random, int width, int height, int channel
 }
 
 // Threads; the random depths of these tests hide most of each other.
-RegistrarOptions by(int num_threads) { return {num_threads, false, false, 0}; }
-RegistrarOptions nearest_by(int num_threads) { return {num_threads, true, false, 0}; }
+RegistrarOptions by(int num_threads) { return {num_threads, false, Occlusion::ignore, 0}; }
+RegistrarOptions nearest_by(int num_threads) { return {num_threads, true, Occlusion::ignore, 0}; }
 
 constexpr int kWidth = 60, kHeight = 44, kSourceWidth = 50, kSourceHeight = 40;
 

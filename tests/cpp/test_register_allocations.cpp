@@ -38,7 +38,7 @@ TEST(Registrar, AllocatesNothingOnceTheFirstFrameIsThrough) {
     std::vector<std::uint8_t> mask(321 * 240);
     std::vector<float> map(2 * 321 * 240);
     for (const int threads : {1, 2, 4})
-        for (const bool occlusion : {false, true}) {
+        for (const Occlusion occlusion : {Occlusion::ignore, Occlusion::hide}) {
             const Registrar registrar(rig, {threads, false, occlusion, 0});
             const auto frame = [&] {
                 registrar.register_frame({source.data(), 160, 128, 1, PixelType::f32, 640},
@@ -49,12 +49,13 @@ TEST(Registrar, AllocatesNothingOnceTheFirstFrameIsThrough) {
             };
             const long before = allocations;
             frame();
-            if (occlusion) {
+            if (occlusion != Occlusion::ignore) {
                 EXPECT_GT(allocations, before) << "the count counts";
             }
             const long warm = allocations;
             for (int i = 0; i < 20; ++i) frame();
-            EXPECT_EQ(allocations, warm) << threads << " threads, occlusion " << occlusion;
+            EXPECT_EQ(allocations, warm)
+                << threads << " threads, occlusion " << static_cast<int>(occlusion);
         }
 }
 

@@ -2,9 +2,12 @@
 // double.
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "scenes.hpp"
@@ -94,7 +97,7 @@ int expect_by_the_book(const Rig& rig, const Frame<T>& source, const std::vector
         depth.data(), width, height, 1, type_of<Depth>(), std::ptrdiff_t(sizeof(Depth)) * width};
     RegistrarOptions options;
     options.num_threads = 1;
-    options.occlusion = false;
+    options.occlusion = Occlusion::ignore;
     options.depth_scale = std::is_same_v<Depth, float> ? 0 : scale;
     const Registrar registrar(rig, options);
     registrar.register_frame(source.view(), depth_view, out.mutable_view(), mask.data());
@@ -214,8 +217,76 @@ TEST(RegisterPaths, AgreeOn16BitsInColour) { expect_every_path_agrees<std::uint1
 TEST(RegisterPaths, AgreeOnFloats) { expect_every_path_agrees<float>(5, 1); }
 TEST(RegisterPaths, AgreeOnFloatsInColour) { expect_every_path_agrees<float>(6, 3); }
 
-// Nothing is read beside the source: what lies there would come through as NaN or as a crash under
-// the address sanitizer, and rows need not be in order.
+// Memory that ends, or begins, where a page begins, or ends, that may not be touched: of a gather
+// that goes beyond, the address sanitizer sees nothing.
+class Fenced {
+   public:
+    Fenced(std::size_t size, bool at_end) {
+        const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+        const std::size_t room = (size + page - 1) / page * page;
+        length_ = room + 2 * page;
+        memory_ = static_cast<char*>(
+            mmap(nullptr, length_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+        mprotect(memory_ + page, room, PROT_READ | PROT_WRITE);
+        data = memory_ + page + (at_end ? room - size : 0);
+    }
+    ~Fenced() { munmap(memory_, length_); }
+    Fenced(const Fenced&) = delete;
+    Fenced& operator=(const Fenced&) = delete;
+
+    char* data;
+
+   private:
+    char* memory_;
+    std::size_t length_;
+};
+
+template <class T>
+void expect_nothing_beside_is_touched(unsigned seed) {
+    on_every_target([&] {
+        std::mt19937 random(seed);
+        const auto fenced = [&](std::ptrdiff_t size) {
+            return std::make_unique<Fenced>(size, random() % 3 != 0);
+        };
+        for (int i = 0; i < 400; ++i) {
+            const int width = 1 + random() % 70, height = 1 + random() % 9;
+            const int source_width = 2 + random() % (i % 2 ? 5 : 40);
+            const int source_height = 2 + random() % 20, channels = i % 3 ? 1 : 3;
+            const Rig rig = any_rig(random, width, height, source_width, source_height);
+            const std::ptrdiff_t pixel = std::ptrdiff_t(sizeof(T)) * channels;
+            const std::ptrdiff_t row = pixel * source_width + (i % 4 ? 0 : 3 * sizeof(T));
+            // Nothing follows the last pixel of the last row.
+            const auto source = fenced(row * (source_height - 1) + pixel * source_width);
+            const auto depth = fenced(4 * width * height), map = fenced(8 * width * height);
+            const auto out = fenced(pixel * width * height), mask = fenced(width * height);
+            const std::vector<float> values = some_depth(random, width * height);
+            std::copy(values.begin(), values.end(), reinterpret_cast<float*>(depth->data));
+            const bool flipped = random() % 2;
+            const ImageView view{source->data + (flipped ? row * (source_height - 1) : 0),
+                                 source_width,
+                                 source_height,
+                                 channels,
+                                 type_of<T>(),
+                                 flipped ? -row : row};
+            RegistrarOptions options;
+            options.num_threads = 1;
+            options.nearest = random() % 4 == 0;
+            const Registrar registrar(rig, options);
+            const ImageView depth_view{depth->data, width, height, 1, PixelType::f32, 4 * width};
+            registrar.register_frame(
+                view, depth_view, {out->data, width, height, channels, type_of<T>(), pixel * width},
+                reinterpret_cast<std::uint8_t*>(mask->data));
+            registrar.map(depth_view, reinterpret_cast<float*>(map->data));
+        }
+    });
+}
+
+TEST(RegisterPaths, TouchNothingBesideTheImages) {
+    expect_nothing_beside_is_touched<std::uint8_t>(8);
+    expect_nothing_beside_is_touched<std::uint16_t>(9);
+    expect_nothing_beside_is_touched<float>(10);
+}
+
 TEST(RegisterPaths, RowsOfTheSourceMayLieAnyWay) {
     on_every_target([] {
         std::mt19937 random(7);
@@ -233,6 +304,26 @@ TEST(RegisterPaths, RowsOfTheSourceMayLieAnyWay) {
         registrar.register_frame(flipped, depth.view(), found.mutable_view(), other_mask.data());
         EXPECT_EQ(found.values, expected.values);
         EXPECT_EQ(other_mask, mask);
+    });
+}
+
+// Beyond what the kernel's integers hold: those of points in the millions are nonsense, and must
+// not be taken for a place.
+TEST(RegisterPaths, WhatLiesMillionsOfPixelsAwayIsOutside) {
+    on_every_target([] {
+        const Frame<std::uint8_t> source(64, 48, 1);
+        const Image depth(40, 30, 1.0f);
+        for (const double away : {4.2e6, 1.3e7, 2e7, 2.516e7, 3e7, 1e9, 1e15, 1e30})
+            for (const auto& [dx, dy] : {std::pair{away, 0.0}, {-away, 0.0}, {0.0, -away}}) {
+                Rig rig{Pinhole::from_hfov(40, 30, 1.0), Pinhole::from_hfov(64, 48, 1.0), {}};
+                rig.source.cx += dx;
+                rig.source.cy += dy;
+                Frame<std::uint8_t> out(40, 30, 1);
+                std::vector<std::uint8_t> mask(40 * 30, 9);
+                Registrar(rig, RegistrarOptions{1})
+                    .register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
+                EXPECT_EQ(mask, std::vector<std::uint8_t>(40 * 30, 1)) << dx << ", " << dy;
+            }
     });
 }
 

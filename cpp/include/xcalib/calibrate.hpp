@@ -24,7 +24,7 @@ enum class SearchMode {
 
 enum class FlowMode {
     automatic,  // on where nothing is searched: it leads from further off than edges do
-    on,         // in every stage; after a search it changes little
+    on,         // after a search too, from stage 2 on, where it changes little
     off,
 };
 
@@ -69,7 +69,8 @@ struct CalibrationOptions {
     std::optional<Pinhole> source_camera;
     // Start of the reference's horizontal field of view; searched where neither is given. (0, 180)
     std::optional<double> reference_hfov_deg;
-    // The reference's intrinsics and the source's are coupled (a gauge): free only on request.
+    // The reference's intrinsics and the source's are coupled (a gauge): free only on request, save
+    // with Solver::adam, which frees them as published.
     bool optimize_reference = false;
 
     // The depth maps are 1 / (scale r + shift) of relative inverse depth: the shift is estimated,
@@ -88,7 +89,7 @@ struct LevelReport {
     int stage = 1;   // of the paper: 1 with its frozen set and prior, 2 with all free
     int width = 0, height = 0;
     int iterations = 0;
-    double initial_cost = 0.0, final_cost = 0.0;  // Eq. (image_loss), plus the prior in stage 1
+    double initial_cost = 0.0, final_cost = 0.0;  // Eq. (image_loss), plus flow term and prior
     double nec = 0.0;                             // mean over the pairs, weighted by c_i
     double aligned = 0.0;                         // the same beyond what chance gives
     double valid_share = 0.0;       // of the reference's edge energy that the source covers

@@ -10,10 +10,17 @@
 
 namespace xcalib {
 
+// Reference pixels that the source camera sees something nearer in front of.
+enum class Occlusion {
+    ignore,  // are not looked for
+    mark,    // are told by the mask; the image shows what is in front: holes would be edges
+    hide,    // are 0 in the image too, and NaN in the map: nothing is seen twice
+};
+
 struct RegistrarOptions {
-    int num_threads = 0;    // 0 uses every core
-    bool nearest = false;   // take the pixel next to the point as it is, not a mean of four
-    bool occlusion = true;  // mask what the source camera sees something nearer in front of
+    int num_threads = 0;   // 0 uses every core
+    bool nearest = false;  // take the pixel next to the point as it is, not a mean of four
+    Occlusion occlusion = Occlusion::mark;
     // Metres per unit of uint16 depth; 1.0 / 256 is KITTI's. 0: refuse integers, which carry no
     // unit of their own.
     double depth_scale = 0;
@@ -40,9 +47,10 @@ class Registrar {
 
     // Samples `source` on the reference grid. `registered` has the source's type and channels and
     // the reference's size; `mask` takes width * height Validity codes. Pixels that are not valid
-    // are 0. Once the first frame is through, nothing is allocated as long as the depth has the
-    // reference's size. Several threads may call it at once.
-    // Throws std::invalid_argument where a size or type does not fit.
+    // are 0, but for those that are only marked as occluded. Once the first frame is through,
+    // nothing is allocated as long as the depth has the reference's size. Several threads may call
+    // it at once; in a forked process, the caller's works alone. Throws std::invalid_argument where
+    // a size or type does not fit.
     void register_frame(const ImageView& source, const ImageView& depth,
                         const MutableImageView& registered, std::uint8_t* mask) const;
 
