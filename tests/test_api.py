@@ -395,7 +395,7 @@ def test_numbers_need_not_be_aligned_where_they_are_read() -> None:
     found = registrar.register(odd(source), odd(depth))
     np.testing.assert_array_equal(found[0], image)
     np.testing.assert_array_equal(found[1], mask)
-    with pytest.raises(ValueError, match="out has .*contiguous, aligned and writeable"):
+    with pytest.raises(ValueError, match=r"out has .*contiguous, aligned and writeable"):
         registrar.register(source, depth, out=odd(image))
 
 
