@@ -95,15 +95,18 @@ FlowTargets targets_of(const FlowField& field, const Image& depth, const Rig& ri
 
 void require_field(const FlowField& field, const Image& image) {
     const std::size_t count = static_cast<std::size_t>(field.width) * field.height;
-    if (field.step >= 1 && field.width == image.width / field.step &&
-        field.height == image.height / field.step && field.x.size() == count &&
-        field.y.size() == count && field.confidence.size() == count)
-        return;
-    throw std::invalid_argument("flow has " + std::to_string(field.width) + "x" +
-                                std::to_string(field.height) + " vectors, expected one for each " +
-                                std::to_string(field.step) + "x" + std::to_string(field.step) +
-                                " px of " + std::to_string(image.width) + "x" +
-                                std::to_string(image.height));
+    if (!(field.step >= 1 && field.width == image.width / field.step &&
+          field.height == image.height / field.step && field.x.size() == count &&
+          field.y.size() == count && field.confidence.size() == count))
+        throw std::invalid_argument(
+            "flow has " + std::to_string(field.width) + "x" + std::to_string(field.height) +
+            " vectors, expected one for each " + std::to_string(field.step) + "x" +
+            std::to_string(field.step) + " px of " + std::to_string(image.width) + "x" +
+            std::to_string(image.height));
+    for (const float confidence : field.confidence)
+        if (!(confidence >= 0 && confidence < 1.001f))  // a rounding beyond 1 is one
+            throw std::invalid_argument("flow has the confidence " + std::to_string(confidence) +
+                                        ", expected [0, 1]");
 }
 
 }  // namespace

@@ -180,6 +180,25 @@ TEST(FlowTerm, AFieldOfAnotherSizeIsRefused) {
     EXPECT_TRUE(has(message, "200x150")) << message;
 }
 
+// One of them infinite, all weights would be 0 or NaN.
+TEST(FlowTerm, AConfidenceThatIsNoneIsRefused) {
+    const Scene scene = make_scene(2);
+    for (const float confidence : {-0.5f, 1.5f, INFINITY, NAN}) {
+        const FlowEstimator wrong = [&](const Image& reference, const Image&,
+                                        const std::vector<std::uint8_t>&) {
+            const std::size_t count = reference.pixels.size();
+            FlowField field{
+                reference.width,           reference.height,          1,
+                std::vector<float>(count), std::vector<float>(count), std::vector<float>(count)};
+            field.confidence[count / 2] = confidence;
+            return field;
+        };
+        const std::string message =
+            refusal([&] { estimate_flow(scene.images, 1, scene.truth, wrong, 24, 2); });
+        EXPECT_TRUE(has(message, "expected [0, 1]")) << confidence << ": " << message;
+    }
+}
+
 TEST(FlowTerm, WhereNothingCanBeToldThereIsNoTerm) {
     const Scene scene = make_scene(2);
     const FlowEstimator unsure = [](const Image& reference, const Image&,

@@ -40,7 +40,7 @@ TEST(Workers, MayBeCalledByManyAtOnce) {
 // A forked process has none of the threads, and locks as they were at that moment: right after a
 // call, threads that come late hold them.
 TEST(Workers, AForkedProcessDoesItAloneAndEnds) {
-    for (int i = 0; i < 300; ++i) {
+    for (int i = 0; i < 100; ++i) {
         auto* workers = new Workers(4);
         std::atomic<int> parts{0};
         const auto count = [&](int) { ++parts; };
