@@ -107,7 +107,7 @@ def test_an_exception_of_the_provider_is_passed_on(frames: list[synthetic.Frame]
         raise ZeroDivisionError("of the provider")
 
     with pytest.raises(ZeroDivisionError, match="of the provider"):
-        calibrate(frames, broken, flow="on", search=SearchOptions(mode="off"))
+        calibrate(frames[:2], broken)  # given, it is used
     calibrate(frames[:2], broken, flow="off", search=SearchOptions(mode="off"))  # not called
 
 

@@ -112,6 +112,7 @@ BatchLoss batch_loss(const WorkingImages& images, const Level& level,
     });
     double weights = 0;
     for (const std::size_t i : batch) weights += level.weights[i];
+    if (!(weights > 0)) loss.image = 1;  // nothing overlaps
     for (std::size_t i = 0; i < batch.size(); ++i) {
         const double weight = weights > 0 ? level.weights[batch[i]] / weights : 0.0;
         loss.image += weight * (1 - equations[i].value.nec);

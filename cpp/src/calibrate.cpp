@@ -74,7 +74,7 @@ void settle_relative_depth(const CalibrationOptions& options, WorkingImages& ima
         const Level level = make_level(images, 1, result.rig, options.num_threads);
         result.report.levels.push_back(solve_level(level, {}, 2,
                                                    0.8 * result.report.levels.back().valid_share,
-                                                   1e-5, options, result.rig));
+                                                   1e-5, options, result.rig, result.rig));
     } else {
         shift = ordinary_shift(result.rig, farthest);
         images = with_shifted_depth(images, shift);
@@ -151,13 +151,15 @@ std::vector<int> choose_frames(int count, int max_frames, std::uint32_t seed) {
 CalibrationResult calibrate(const std::vector<ImageView>& references,
                             const std::vector<ImageView>& sources,
                             const std::vector<ImageView>& depths, const std::optional<Rig>& initial,
-                            const CalibrationOptions& options, const Progress& progress,
+                            const CalibrationOptions& given, const Progress& progress,
                             const FlowEstimator& flow) {
     const double start = seconds_now();
     const Progress tell = [&](const std::string& stage, double share) {
         if (progress) progress(stage, share);
     };
-    options.validate();
+    given.validate();
+    CalibrationOptions options = given;
+    if (flow && options.flow == FlowMode::automatic) options.flow = FlowMode::on;
     validate_frames(references, sources, depths);
     require_size("options: reference_camera", options.reference_camera, references[0]);
     require_size("options: source_camera", options.source_camera, sources[0]);

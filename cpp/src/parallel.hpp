@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -34,8 +35,14 @@ void parallel_ranges(int count, int num_threads, const Work& work) {
         }
     };
     std::vector<std::thread> threads;
-    for (int part = 1; part < parts; ++part) threads.emplace_back(guarded, part);
+    int started = 1;
+    try {
+        for (; started < parts; ++started) threads.emplace_back(guarded, started);
+    } catch (const std::system_error&) {
+        // No more threads to be had: their parts are done here.
+    }
     guarded(0);
+    for (int part = started; part < parts; ++part) guarded(part);
     for (std::thread& thread : threads) thread.join();
     for (const std::exception_ptr& error : errors)
         if (error) std::rethrow_exception(error);

@@ -119,7 +119,7 @@ double best_shift(const WorkingImages& all_images, const CalibrationOptions& opt
         Rig solved = found;  // from the best so far, the nearest that is known
         const Level level =
             make_level(with_shifted_depth(images, shift), 1, solved, options.num_threads);
-        const double nec = solve_level(level, {}, 2, share_limit, 1e-5, quick, solved).nec;
+        const double nec = solve_level(level, {}, 2, share_limit, 1e-5, quick, found, solved).nec;
         if (nec > most) {
             most = nec;
             found = solved;

@@ -98,10 +98,10 @@ NecValue pooled(const Level& level, const Rig& rig, int num_threads) {
 
 LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow, int stage,
                         double share_limit, double tolerance, const CalibrationOptions& options,
-                        Rig& rig) {
+                        const Rig& anchor, Rig& rig) {
     const double start = seconds_now();
     SolverParameters p = solver_from_rig(rig);
-    const SolverParameters held = p;
+    const SolverParameters held = solver_from_rig(anchor);
     ceres::Problem problem;
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
@@ -161,20 +161,21 @@ LevelReport solve_stage(const WorkingImages& images, const Level& level, int sta
                         const FlowEstimator& estimator, Rig& rig) {
     const bool searches = options.search.mode != SearchMode::off;
     if (options.flow == FlowMode::off || (options.flow == FlowMode::automatic && searches))
-        return solve_level(level, {}, stage, share_limit, tolerance, options, rig);
+        return solve_level(level, {}, stage, share_limit, tolerance, options, rig, rig);
     // Coarse levels are too small for patches, and may have far to go.
     const bool coarse = level.factor >= kCoarse;
     const int factor = coarse ? kCoarse / 2 : level.factor;
     const int max_shift = coarse ? 48 : 24;
     constexpr double kSettled = 0.1;  // [working px]
     const double start = seconds_now();
+    const Rig anchor = rig;
     LevelReport report;
     for (int round = 0; round < options.flow_rounds; ++round) {
         const Rig from = rig;
         const std::vector<FlowTargets> flow =
             estimate_flow(images, factor, rig, estimator, max_shift, options.num_threads);
         const LevelReport before = report;
-        report = solve_level(level, flow, stage, share_limit, tolerance, options, rig);
+        report = solve_level(level, flow, stage, share_limit, tolerance, options, anchor, rig);
         report.iterations += before.iterations;
         if (round > 0) report.initial_cost = before.initial_cost;
         if (median_distance(level, from, rig) < kSettled) break;

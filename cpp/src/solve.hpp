@@ -12,12 +12,12 @@ double seconds_now();
 // Mean over the pairs, weighted by c_i (the valid share plainly).
 NecValue pooled(const Level& level, const Rig& rig, int num_threads);
 
-// Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and prior,
-// stage 2 everything free. A pair whose valid share falls below `share_limit` is charged for it. It
-// stops where a step lowers the cost by less than the share `tolerance`.
+// Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and a prior
+// that holds `anchor`, stage 2 everything free. A pair whose valid share falls below `share_limit`
+// is charged for it. It stops where a step lowers the cost by less than the share `tolerance`.
 LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow, int stage,
                         double share_limit, double tolerance, const CalibrationOptions& options,
-                        Rig& rig);
+                        const Rig& anchor, Rig& rig);
 
 // The same, with the flow term of Eq. (total_loss) where the options have it: flow is estimated
 // where `rig` is, held while the solver moves, and estimated anew.

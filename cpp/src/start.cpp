@@ -329,7 +329,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
             candidate.levels.push_back(
                 searches ? solve_level(level, {}, steps[s].stage, candidate.share_limit, kTolerance,
-                                       quick, candidate.rig)
+                                       quick, candidate.rig, candidate.rig)
                          : solve_stage(images, level, steps[s].stage, candidate.share_limit,
                                        kTolerance, quick, flow, candidate.rig));
             candidate.merit = merit(pooled(level, candidate.rig, num_threads));

@@ -23,7 +23,8 @@ enum class SearchMode {
 };
 
 enum class FlowMode {
-    automatic,  // on where nothing is searched: it leads from further off than edges do
+    automatic,  // on where nothing is searched, since it leads from further off than edges do,
+                // and with an estimator of the caller
     on,         // after a search too, from stage 2 on, where it changes little
     off,
 };
