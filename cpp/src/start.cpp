@@ -321,8 +321,9 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
 
     // Halving: each level costs four times the last, and tells more.
     for (std::size_t s = 0; s + 1 < steps.size() || s == 0; ++s) {
-        // With one candidate nothing is to be compared: the refinement does the rest.
-        if (s > 0 && (steps[s].factor == 1 || (!searches && steps[s].stage == 2))) break;
+        if (s > 0 && steps[s].factor == 1) break;
+        // Flow is dear, and with one candidate nothing is compared: the refinement does the rest.
+        if (s > 0 && steps[s].stage == 2 && !searches && options.flow != FlowMode::off) break;
         if (s == 0 || steps[s].factor != steps[s - 1].factor)
             keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
