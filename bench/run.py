@@ -1,6 +1,6 @@
 """The benchmarks, one after the other. Each prints the machine, the commit and its figures.
 
-Not among them, for they take long: frame_choice, clock_offset.
+Not among them, for they take long: frame_choice, clock_offset, flow_term.
 """
 
 import subprocess
