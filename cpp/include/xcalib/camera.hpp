@@ -54,7 +54,7 @@ struct Rig {
     Pinhole reference;
     Pinhole source;
     Pose source_from_reference;
-    std::optional<RelativeDepth> relative_depth;  // none: calibrated with metric depth
+    std::optional<RelativeDepth> relative_depth = std::nullopt;  // none: metric depth
 
     Eigen::Matrix3d R() const { return source_from_reference.rotation.toRotationMatrix(); }
     const Eigen::Vector3d& t() const { return source_from_reference.translation; }
