@@ -89,6 +89,15 @@ def test_calibrate_and_register_with_relative_depth(blue: Path) -> None:
     np.testing.assert_array_equal(read_image(sorted(out.glob("*.png"))[0]), expected)
 
 
+def test_images_that_none_can_read_are_named(blue: Path) -> None:
+    for image in list_files(blue / "visible"):
+        image.write_bytes(b"no image")
+    arguments = (blue / "visible", blue / "thermal", "--depth", blue / "blue.onnx")
+    result = run("calibrate", *arguments, "--choose", "spread", "-o", blue / "out.yaml")
+    assert result.exit_code == 2
+    assert str(blue / "visible") in result.stderr
+
+
 def test_depth_and_rig_that_do_not_go_together_are_told(blue: Path) -> None:
     images = blue / "visible", blue / "thermal", "--depth"
     out = blue / "out"

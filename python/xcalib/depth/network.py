@@ -146,7 +146,7 @@ class NetworkDepth:
 
     def pooled(self, references: Iterable[Image]) -> RelativeDepth:
         """One `normalization` for all these images: where a calibration starts."""
-        maps = []
+        maps = [np.empty(0, np.float32)]  # there may be no image that can be read
         for reference in references:
             values = self._raws([reference])[0].values
             maps.append(values[np.isfinite(values)])
