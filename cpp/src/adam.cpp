@@ -211,7 +211,6 @@ void solve_adam(const WorkingImages& images, const CalibrationOptions& options,
     Adam adam;
     std::vector<std::size_t> order;
     Level level;
-    LevelReport entry;
     double began = seconds_now();
     for (std::size_t step = 0; step < count; ++step) {
         const std::size_t first = step % per_epoch * batch_size;
@@ -244,21 +243,15 @@ void solve_adam(const WorkingImages& images, const CalibrationOptions& options,
                              rig.source.width, rig.source.height);
         progress(static_cast<double>(step + 1) / static_cast<double>(count));
 
-        if (entry.iterations++ == 0) entry.initial_cost = told.total;
         if (step + 1 != fine_from && step + 1 != count) continue;
-        const NecValue value = pooled(level, rig, options.num_threads);
-        entry.factor = level.factor;
-        entry.stage = stage;
-        entry.width = level.width;
-        entry.height = level.height;
+        const std::size_t from = stage == 1 ? 0 : fine_from;
+        LevelReport entry = report_on(level, stage, rig, options.num_threads);
+        entry.iterations = static_cast<int>(step + 1 - from);
+        entry.initial_cost = report.steps[from].total;
         entry.final_cost = told.total;
-        entry.nec = value.nec;
-        entry.aligned = value.aligned;
-        entry.valid_share = value.valid_share;
         entry.seconds = seconds_now() - began;
         entry.stopped = format("the schedule ended after %zu steps", step + 1);
         report.levels.push_back(entry);
-        entry = {};
         began = seconds_now();
     }
 }

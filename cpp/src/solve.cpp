@@ -96,6 +96,19 @@ NecValue pooled(const Level& level, const Rig& rig, int num_threads) {
     return sum;
 }
 
+LevelReport report_on(const Level& level, int stage, const Rig& rig, int num_threads) {
+    const NecValue value = pooled(level, rig, num_threads);
+    LevelReport report;
+    report.factor = level.factor;
+    report.stage = stage;
+    report.width = level.width;
+    report.height = level.height;
+    report.nec = value.nec;
+    report.aligned = value.aligned;
+    report.valid_share = value.valid_share;
+    return report;
+}
+
 LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow, int stage,
                         double share_limit, double tolerance, const CalibrationOptions& options,
                         const Rig& anchor, Rig& rig) {
@@ -138,20 +151,12 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
 
     rig = rig_from_solver(p, rig.reference.width, rig.reference.height, rig.source.width,
                           rig.source.height);
-    LevelReport report;
-    report.factor = level.factor;
-    report.stage = stage;
-    report.width = level.width;
-    report.height = level.height;
+    LevelReport report = report_on(level, stage, rig, options.num_threads);
     report.iterations = static_cast<int>(summary.iterations.size());
     report.initial_cost = summary.initial_cost;
     report.final_cost = summary.final_cost;
     report.stopped = summary.message;
     report.condition_number = condition_number(problem);
-    const NecValue value = pooled(level, rig, options.num_threads);
-    report.nec = value.nec;
-    report.aligned = value.aligned;
-    report.valid_share = value.valid_share;
     report.seconds = seconds_now() - start;
     return report;
 }

@@ -12,6 +12,9 @@ double seconds_now();
 // Mean over the pairs, weighted by c_i (the valid share plainly).
 NecValue pooled(const Level& level, const Rig& rig, int num_threads);
 
+// What a level says of a rig: all of the report that does not depend on how it was solved.
+LevelReport report_on(const Level& level, int stage, const Rig& rig, int num_threads);
+
 // Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and a prior
 // that holds `anchor`, stage 2 everything free. A pair whose valid share falls below `share_limit`
 // is charged for it. It stops where a step lowers the cost by less than the share `tolerance`.

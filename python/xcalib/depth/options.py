@@ -101,13 +101,11 @@ DEPTH_OPTIONS: tuple[Callable[[Any], Any], ...] = (
         help="Stereo: principal point of the partner minus the reference's [px].  [default: 0]",
     ),
     click.option("--complete", is_flag=True, help="Fill unknown depth along image edges."),
-    click.option(
+    number(
         "--completion-confidence",
-        metavar="F",
-        type=float,
-        default=MeasuredDepth.completion_confidence,
-        show_default=True,
-        help="Complete: filled pixels below this confidence stay unknown, 0 to 1.",
+        "F",
+        MeasuredDepth.completion_confidence,
+        "Complete: filled pixels below this confidence stay unknown, 0 to 1.",
     ),
     click.option(
         "--depth-steady", is_flag=True, help="Average depth over consecutive frames of a video."
