@@ -283,6 +283,13 @@ Options options_from(const py::kwargs& fields) {
     return object.cast<Options>();
 }
 
+py::dict time_of(const CalibrationReport& report) {
+    const CalibrationTimes& time = report.time;
+    return py::dict(py::arg("prepare") = time.prepare, py::arg("search") = time.search,
+                    py::arg("warp") = time.warp, py::arg("value") = time.value,
+                    py::arg("jacobian") = time.jacobian, py::arg("solver") = time.solver);
+}
+
 py::dict dict_of(const CalibrationReport& report) {
     py::list candidates, levels, steps;
     for (const AdamStep& s : report.steps)
@@ -306,7 +313,7 @@ py::dict dict_of(const CalibrationReport& report) {
                      py::arg("seconds") = l.seconds, py::arg("stopped") = l.stopped));
     return py::dict(
         py::arg("converged") = report.converged, py::arg("message") = report.message,
-        py::arg("seconds") = report.seconds, py::arg("search_seconds") = report.search_seconds,
+        py::arg("seconds") = report.seconds, py::arg("time") = time_of(report),
         py::arg("working_width") = report.working_width,
         py::arg("working_height") = report.working_height, py::arg("nec") = report.nec,
         py::arg("baseline_nec") = report.baseline_nec, py::arg("contrast") = report.contrast,
@@ -557,7 +564,13 @@ A rig that was calibrated with it has its translation in the unit that the scale
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
         .def_readonly("message", &CalibrationReport::message, "Why, in one line.")
         .def_readonly("seconds", &CalibrationReport::seconds, "[s]")
-        .def_readonly("search_seconds", &CalibrationReport::search_seconds, "[s]")
+        .def_property_readonly(
+            "time", &time_of,
+            "Where they go [s]: `prepare` (working images and their pyramid), `search`, `warp`\n"
+            "(reprojection and sampling of the passes over image pairs), `value` (the rest of the\n"
+            "passes without derivatives), `jacobian` (the rest of those with them), `solver` "
+            "(Ceres\n"
+            "itself). Of what threads do side by side, their sum divided by their number.")
         .def_readonly("working_width", &CalibrationReport::working_width, "[px]")
         .def_readonly("working_height", &CalibrationReport::working_height, "[px]")
         .def_readonly("nec", &CalibrationReport::nec, "At the finest level.")

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "adam.hpp"
+#include "parallel.hpp"
 #include "relative_depth.hpp"
 #include "solve.hpp"
 #include "start.hpp"
@@ -40,7 +41,7 @@ void search_and_refine(const WorkingImages& images, const ImageView& reference,
     tell("search", 0.05);
     const Start found = find_start(images, reference, source, initial, options, flow,
                                    [&](double share) { tell("search", 0.05 + 0.55 * share); });
-    report.search_seconds = found.search_seconds;
+    report.time.search = found.search_seconds;
     report.candidates = found.candidates;
     report.levels = found.levels;
     result.rig = found.rig;
@@ -198,6 +199,9 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
     result.converged = report.converged;
     tell("judge", 1.0);
     report.seconds = seconds_now() - start;
+    const double search = report.time.search;
+    report.time = images.times->seconds(resolve_threads(options.num_threads));
+    report.time.search = search;
     return result;
 }
 

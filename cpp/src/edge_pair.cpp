@@ -1,34 +1,200 @@
 #include <cmath>
+#include <vector>
 
-#include "bilinear.hpp"
 #include "image_pair.hpp"
+#include "map_row.hpp"
 #include "nec_pass.hpp"
-#include "xcalib/warp.hpp"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "edge_pair.cpp"
+// Vectors whose size is not known to the compiler cannot stand in a struct.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>
+// After it.
+#include "pass-inl.hpp"
+
+#ifndef XCALIB_EDGE_PAIR_ONCE
+#define XCALIB_EDGE_PAIR_ONCE
 namespace xcalib {
 namespace {
 
-using Complex = std::complex<float>;
-
-// A source rolled by phi shows every direction turned by it: z by twice that.
-Complex unroll(const Rig& rig) {
-    const Eigen::Matrix3d R = rig.R();
-    const double roll = std::atan2(R(1, 0), R(0, 0));
-    return {static_cast<float>(std::cos(2 * roll)), static_cast<float>(-std::sin(2 * roll))};
-}
-
-struct Row {
+// One pass over a pair. A source rolled by phi shows every direction turned by it, z by twice that:
+// `turn` is exp(-2 i phi).
+struct EdgePass {
+    const EdgeMap &reference, &source;
+    const Image& depth;
+    const Pinhole& camera;
+    Reprojection reprojection;
+    ProjectionDerivative derivative;
+    const Parameters& parameters;
+    float turn_real, turn_imaginary;
+    PointRow points;
     std::vector<float> u, v;
+    struct Component {
+        std::vector<float> value, du, dv, derivative;
+        Component(int room, int count)
+            : value(room), du(room), dv(room), derivative(room * count) {}
+    } real, imaginary;
     std::vector<std::uint8_t> validity;
-    explicit Row(int width) : u(width), v(width), validity(width) {}
+
+    EdgePass(const EdgeMap& reference, const EdgeMap& source, const Image& depth, const Rig& rig,
+             const Parameters& parameters)
+        : reference(reference), source(source), depth(depth), camera(rig.reference),
+          reprojection(rig), derivative(rig), parameters(parameters), points(depth.width),
+          u(depth.width + kRoom, NAN), v(depth.width + kRoom, NAN),
+          real(depth.width + kRoom, parameters.size()),
+          imaginary(depth.width + kRoom, parameters.size()), validity(depth.width) {
+        const Eigen::Matrix3d R = rig.R();
+        const double roll = std::atan2(R(1, 0), R(0, 0));
+        turn_real = static_cast<float>(std::cos(2 * roll));
+        turn_imaginary = static_cast<float>(-std::sin(2 * roll));
+    }
 };
 
-NecValue value_of(double rr, double ss, double rs, double reference_energy) {
+struct EdgeSums {
+    double rr = 0, ss = 0, rs = 0;
+};
+
+}  // namespace
+}  // namespace xcalib
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace xcalib {
+namespace HWY_NAMESPACE {
+namespace {
+
+struct ComplexSample {
+    Sampled real, imaginary;
+};
+HWY_INLINE ComplexSample sample(const EdgePass& pass, const Cell& cell) {
+    // Real and imaginary parts in turn.
+    const float* HWY_RESTRICT z = reinterpret_cast<const float*>(pass.source.z.data());
+    const Int top = hn::ShiftLeft<1>(cell.top), bottom = hn::ShiftLeft<1>(cell.bottom);
+    const Pair t0 = gather_pairs(z, top), t1 = gather_pairs(z + 2, top);
+    const Pair b0 = gather_pairs(z, bottom), b1 = gather_pairs(z + 2, bottom);
+    return {interpolated(cell, t0.first, t1.first, b0.first, b1.first),
+            interpolated(cell, t0.second, t1.second, b0.second, b1.second)};
+}
+
+// The source's edges of a row in `real` and `imaginary`, 0 where it is not valid, and its sums.
+EdgeSums warp_edge_row(EdgePass& pass, int y) {
+    const FloatTag d;
+    const int width = pass.depth.width;
+    map_row_inline(pass.reprojection, pass.depth.row(y), y, width, pass.u.data(), pass.v.data(),
+                   pass.validity.data());
+    const Float turn_real = hn::Set(d, pass.turn_real);
+    const Float turn_imaginary = hn::Set(d, pass.turn_imaginary);
+    const float* HWY_RESTRICT reference = reinterpret_cast<const float*>(pass.reference.row(y));
+    Float rr = hn::Zero(d), ss = rr, rs = rr;
+    for (int x = 0; x < width; x += lanes()) {
+        const Float u = load(pass.u.data() + x);
+        const Mask ok = hn::Eq(u, u);
+        const Cell cell =
+            cell_at(hn::IfThenElseZero(ok, u), hn::IfThenElseZero(ok, load(pass.v.data() + x)),
+                    pass.source.width, pass.source.height);
+        const ComplexSample z = sample(pass, cell);
+        const auto put_turned = [&](Float real, Float imaginary, std::vector<float>& out_real,
+                                    std::vector<float>& out_imaginary) HWY_ATTR {
+            const Float re = hn::Sub(hn::Mul(real, turn_real), hn::Mul(imaginary, turn_imaginary));
+            const Float im = hn::MulAdd(real, turn_imaginary, hn::Mul(imaginary, turn_real));
+            hn::StoreU(hn::IfThenElseZero(ok, re), d, out_real.data() + x);
+            hn::StoreU(hn::IfThenElseZero(ok, im), d, out_imaginary.data() + x);
+        };
+        put_turned(z.real.value, z.imaginary.value, pass.real.value, pass.imaginary.value);
+        Float r_real, r_imaginary;  // with room past the end
+        hn::LoadInterleaved2(d, reference + 2 * x, r_real, r_imaginary);
+        r_real = hn::IfThenElseZero(ok, r_real);
+        r_imaginary = hn::IfThenElseZero(ok, r_imaginary);
+        const Float s_real = load(pass.real.value.data() + x);
+        const Float s_imaginary = load(pass.imaginary.value.data() + x);
+        rr = hn::Add(rr, hn::MulAdd(r_real, r_real, hn::Mul(r_imaginary, r_imaginary)));
+        ss = hn::Add(ss, hn::MulAdd(s_real, s_real, hn::Mul(s_imaginary, s_imaginary)));
+        rs = hn::Add(rs, hn::MulAdd(r_real, s_real, hn::Mul(r_imaginary, s_imaginary)));
+        if (pass.parameters.size() == 0) continue;
+        put_turned(z.real.du, z.imaginary.du, pass.real.du, pass.imaginary.du);
+        put_turned(z.real.dv, z.imaginary.dv, pass.real.dv, pass.imaginary.dv);
+    }
+    return {total(rr), total(ss), total(rs)};
+}
+
+// Appends the row that was warped last.
+void append_edge_row(EdgePass& pass, int y, PassTile& tile) {
+    const FloatTag d;
+    const int width = pass.depth.width, stride = width + kRoom;
+    const float* depth = pass.depth.row(y);
+    point_row(pass.derivative, pass.camera, depth, y, width, pass.points);
+    for (EdgePass::Component* part : {&pass.real, &pass.imaginary})
+        derivative_row(pass.derivative, pass.parameters, pass.camera, depth, y, part->du.data(),
+                       part->dv.data(), width, pass.points, part->derivative.data(), stride);
+    for (int i = 0; i < tile.count; ++i) {
+        if (pass.parameters[i] != kRotationZ) continue;
+        for (int x = 0; x < width; ++x) {  // of exp(-2 i phi)
+            pass.real.derivative[i * stride + x] += 2 * pass.imaginary.value[x];
+            pass.imaginary.derivative[i * stride + x] -= 2 * pass.real.value[x];
+        }
+    }
+    const float* reference = reinterpret_cast<const float*>(pass.reference.row(y));
+    for (int x = 0; x < width; x += lanes()) {
+        const Float u = load(pass.u.data() + x);
+        const Mask ok = hn::Eq(u, u);
+        if (hn::AllFalse(d, ok)) continue;
+        for (int p = 0; p < tile.count; ++p)
+            put(tile, p, ok, load(pass.real.derivative.data() + p * stride + x),
+                load(pass.imaginary.derivative.data() + p * stride + x));
+        put(tile, tile.count, ok, load(pass.real.value.data() + x),
+            load(pass.imaginary.value.data() + x));
+        Float real, imaginary;
+        hn::LoadInterleaved2(d, reference + 2 * x, real, imaginary);
+        put(tile, tile.count + 1, ok, real, imaginary);
+        finish(tile, ok);
+    }
+}
+
+void flush_edge_tile(PassTile& tile) { flush(tile); }
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace xcalib
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace xcalib {
+namespace {
+
+HWY_EXPORT(warp_edge_row);
+HWY_EXPORT(append_edge_row);
+HWY_EXPORT(flush_edge_tile);
+
+NecValue value_of(const EdgeSums& sums, double reference_energy) {
     NecValue value;
-    value.norm = std::sqrt(rr * ss);
-    value.nec = value.aligned = value.norm > 0 ? rs / value.norm : 0.0;
-    value.valid_share = reference_energy > 0 ? rr / reference_energy : 0.0;
+    value.norm = std::sqrt(sums.rr * sums.ss);
+    value.nec = value.aligned = value.norm > 0 ? sums.rs / value.norm : 0.0;
+    value.valid_share = reference_energy > 0 ? sums.rr / reference_energy : 0.0;
     return value;
+}
+
+// Calls work(y) for each row once it is warped, and gives the sums.
+template <class Work>
+EdgeSums for_each_warped_row(EdgePass& pass, WorkTimes* times, const Work& work) {
+    const Clock::time_point start = Clock::now();
+    std::int64_t warping = 0;
+    EdgeSums sums;
+    for (int y = 0; y < pass.depth.height; ++y) {
+        const Clock::time_point before = Clock::now();
+        const EdgeSums row = HWY_DYNAMIC_DISPATCH(warp_edge_row)(pass, y);
+        if (times) warping += nanoseconds_since(before);
+        sums.rr += row.rr;
+        sums.ss += row.ss;
+        sums.rs += row.rs;
+        work(y);
+    }
+    if (times) {
+        times->warp += warping;
+        (pass.parameters.size() > 0 ? times->jacobian : times->value) +=
+            nanoseconds_since(start) - warping;
+    }
+    return sums;
 }
 
 }  // namespace
@@ -39,78 +205,25 @@ EdgePair::EdgePair(EdgeMap reference, EdgeMap source, Image depth)
         if (depth_.pixels[i] <= 0) reference_.z[i] = 0;
         reference_energy_ += std::norm(reference_.z[i]);
     }
+    reference_.z.resize(reference_.z.size() + kRoom);  // the last row is read beyond its end
 }
 
 NecValue EdgePair::evaluate(const Rig& rig) const {
-    const Reprojection reprojection(rig);
-    const Complex turn = unroll(rig);
-    Row row(depth_.width);
-    double rr = 0, ss = 0, rs = 0;
-    for (int y = 0; y < depth_.height; ++y) {
-        map_row(reprojection, depth_.row(y), y, depth_.width, row.u.data(), row.v.data(),
-                row.validity.data());
-        const Complex* reference = reference_.row(y);
-        for (int x = 0; x < depth_.width; ++x) {
-            if (row.validity[x]) continue;
-            const Complex r = reference[x];
-            const Complex s = product(bilinear(source_, row.u[x], row.v[x]).value, turn);
-            rr += std::norm(r);
-            ss += std::norm(s);
-            rs += r.real() * s.real() + r.imag() * s.imag();
-        }
-    }
-    return value_of(rr, ss, rs, reference_energy_);
+    const Parameters none(0);
+    EdgePass pass(reference_, source_, depth_, rig, none);
+    return value_of(for_each_warped_row(pass, times.get(), [](int) {}), reference_energy_);
 }
 
-template <int kCount>
-NecNormalEquations EdgePair::normal_equations_of(const Rig& rig) const {
-    const Reprojection reprojection(rig);
-    const ProjectionDerivative derivative(rig);
-    const Complex turn = unroll(rig);
-    const Pinhole& camera = rig.reference;
-    Row row(depth_.width);
-    // [dZ_S/dp, Z_S, Z_R] of a row's pixels, real and imaginary parts in turn.
-    Eigen::Matrix<double, kCount + 2, Eigen::Dynamic> columns(kCount + 2, 2 * depth_.width);
-    Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(kCount + 2, kCount + 2);
-    for (int y = 0; y < depth_.height; ++y) {
-        map_row(reprojection, depth_.row(y), y, depth_.width, row.u.data(), row.v.data(),
-                row.validity.data());
-        const double ray_y = (y - camera.cy) / camera.fy;
-        int filled = 0;
-        for (int x = 0; x < depth_.width; ++x) {
-            if (row.validity[x]) continue;
-            Sample<Complex> s = bilinear(source_, row.u[x], row.v[x]);
-            s = {product(s.value, turn), product(s.du, turn), product(s.dv, turn)};
-            const auto ray_x =
-                static_cast<float>((x - camera.cx - camera.skew * ray_y) / camera.fx);
-            float real[kCount], imaginary[kCount];
-            const float depth = depth_.row(y)[x];
-            derivative.chain<kCount>(ray_x, static_cast<float>(ray_y), depth, s.du.real(),
-                                     s.dv.real(), real, 1);
-            derivative.chain<kCount>(ray_x, static_cast<float>(ray_y), depth, s.du.imag(),
-                                     s.dv.imag(), imaginary, 1);
-            real[kRotationZ] += 2 * s.value.imag();  // of exp(-2 i phi)
-            imaginary[kRotationZ] -= 2 * s.value.real();
-            for (int p = 0; p < kCount; ++p) {
-                columns(p, filled) = real[p];
-                columns(p, filled + 1) = imaginary[p];
-            }
-            columns(kCount, filled) = s.value.real();
-            columns(kCount, filled + 1) = s.value.imag();
-            columns(kCount + 1, filled) = reference_.row(y)[x].real();
-            columns(kCount + 1, filled + 1) = reference_.row(y)[x].imag();
-            filled += 2;
-        }
-        gram.selfadjointView<Eigen::Lower>().rankUpdate(columns.leftCols(filled));
-    }
-    gram = gram.selfadjointView<Eigen::Lower>();
-    return equations_from_gram(gram, value_of(gram(kCount + 1, kCount + 1), gram(kCount, kCount),
-                                              gram(kCount + 1, kCount), reference_energy_));
-}
-
-NecNormalEquations EdgePair::normal_equations(const Rig& rig, int count) const {
-    return count <= kNumWithoutReference ? normal_equations_of<kNumWithoutReference>(rig)
-                                         : normal_equations_of<kNumParameters>(rig);
+NecNormalEquations EdgePair::normal_equations(const Rig& rig, const Parameters& parameters) const {
+    EdgePass pass(reference_, source_, depth_, rig, parameters);
+    // Columns [dZ_S/dp, Z_S, Z_R] of the pixels, real and imaginary parts.
+    PassTile tile(parameters.size());
+    const EdgeSums sums = for_each_warped_row(pass, times.get(), [&](int y) {
+        HWY_DYNAMIC_DISPATCH(append_edge_row)(pass, y, tile);
+    });
+    HWY_DYNAMIC_DISPATCH(flush_edge_tile)(tile);
+    return equations_from_gram(tile.gram(), value_of(sums, reference_energy_));
 }
 
 }  // namespace xcalib
+#endif

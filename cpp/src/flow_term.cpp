@@ -35,31 +35,6 @@ void for_each(const FlowTargets& targets, const Rig& rig, const Work& work) {
     }
 }
 
-template <int kCount>
-FlowEquations equations_of(const FlowTargets& targets, const Rig& rig) {
-    const double unit = unit_of(targets);
-    const ProjectionDerivative derivative(rig);
-    Eigen::Matrix<double, kCount, kCount> hessian = Eigen::Matrix<double, kCount, kCount>::Zero();
-    Eigen::Matrix<double, kCount, 1> gradient = Eigen::Matrix<double, kCount, 1>::Zero();
-    double value = 0;
-    for_each(targets, rig,
-             [&](const FlowTarget& target, const Eigen::Vector3d& ray, const Eigen::Vector2d& at) {
-                 const Eigen::Vector2d e = unit * (at - Eigen::Vector2d(target.u, target.v));
-                 const double length = std::sqrt(e.squaredNorm() + kSoft * kSoft);
-                 value += target.weight * (length - kSoft);
-                 Eigen::Matrix<float, kCount, 1> row;
-                 for (int axis = 0; axis < 2; ++axis) {
-                     derivative.chain<kCount>(static_cast<float>(ray.x()),
-                                              static_cast<float>(ray.y()), target.depth, axis == 0,
-                                              axis == 1, row.data(), 1);
-                     const Eigen::Matrix<double, kCount, 1> j = unit * row.template cast<double>();
-                     hessian += target.weight / length * j * j.transpose();
-                     gradient += target.weight / length * e[axis] * j;
-                 }
-             });
-    return {value, hessian, gradient};
-}
-
 // The most confident vector of each cell, as a target.
 FlowTargets targets_of(const FlowField& field, const Image& depth, const Rig& rig) {
     FlowTargets out{rig, {}};
@@ -122,13 +97,34 @@ double flow_value(const FlowTargets& targets, const Rig& rig) {
     return value;
 }
 
-FlowEquations flow_equations(const FlowTargets& targets, const Rig& rig, int count) {
-    return count == kNumParameters ? equations_of<kNumParameters>(targets, rig)
-                                   : equations_of<kNumWithoutReference>(targets, rig);
+FlowEquations flow_equations(const FlowTargets& targets, const Rig& rig,
+                             const Parameters& parameters) {
+    const double unit = unit_of(targets);
+    const ProjectionDerivative derivative(rig);
+    const int count = parameters.size();
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(count, count);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(count), j(count);
+    double value = 0;
+    for_each(targets, rig,
+             [&](const FlowTarget& target, const Eigen::Vector3d& ray, const Eigen::Vector2d& at) {
+                 const Eigen::Vector2d e = unit * (at - Eigen::Vector2d(target.u, target.v));
+                 const double length = std::sqrt(e.squaredNorm() + kSoft * kSoft);
+                 value += target.weight * (length - kSoft);
+                 float row[kNumParameters];
+                 for (int axis = 0; axis < 2; ++axis) {
+                     derivative.chain<kNumParameters>(static_cast<float>(ray.x()),
+                                                      static_cast<float>(ray.y()), target.depth,
+                                                      axis == 0, axis == 1, row, 1);
+                     for (int i = 0; i < count; ++i) j[i] = unit * row[parameters[i]];
+                     hessian += target.weight / length * j * j.transpose();
+                     gradient += target.weight / length * e[axis] * j;
+                 }
+             });
+    return {value, hessian, gradient};
 }
 
-CompressedBlock FlowCost::linearized(const Rig& rig, int count) const {
-    const FlowEquations equations = flow_equations(targets_, rig, count);
+CompressedBlock FlowCost::linearized(const Rig& rig, const Parameters& free) const {
+    const FlowEquations equations = flow_equations(targets_, rig, free);
     return compress(weight_ * equations.hessian, weight_ * equations.gradient,
                     weight_ * equations.value);
 }

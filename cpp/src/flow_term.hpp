@@ -27,7 +27,7 @@ struct FlowTargets {
     std::vector<FlowTarget> targets;
 };
 
-// The flow term and its Gauss-Newton, by the first `count` of `Parameter`:
+// The flow term and its Gauss-Newton, by the given parameters:
 //     sum of weight (sqrt(e^2 + s^2) - s),  e = |T(x; p) - (u, v)| f_R / f_S / (w_R / 2)
 // The unit is half the width of the reference, in which a misalignment costs with lambda = 2.5
 // about what it takes from the NEC; s is a pixel of 640.
@@ -37,17 +37,18 @@ struct FlowEquations {
     Eigen::VectorXd gradient;
 };
 double flow_value(const FlowTargets& targets, const Rig& rig);
-FlowEquations flow_equations(const FlowTargets& targets, const Rig& rig, int count);
+FlowEquations flow_equations(const FlowTargets& targets, const Rig& rig,
+                             const Parameters& parameters);
 
 // weight times the above as a cost for Ceres.
 class FlowCost : public RigCost {
    public:
-    FlowCost(const FlowTargets& targets, double weight, bool with_reference)
-        : RigCost(targets.rig, with_reference), targets_(targets), weight_(weight) {}
+    FlowCost(const FlowTargets& targets, double weight, const Parameters& free)
+        : RigCost(targets.rig, free), targets_(targets), weight_(weight) {}
 
    private:
     double cost(const Rig& rig) const override { return weight_ * flow_value(targets_, rig); }
-    CompressedBlock linearized(const Rig& rig, int count) const override;
+    CompressedBlock linearized(const Rig& rig, const Parameters& free) const override;
 
     const FlowTargets& targets_;
     double weight_;

@@ -1,6 +1,10 @@
 // A pair of images at one level, as the solver sees it: something that is compared through a rig.
 #pragma once
 
+#include <memory>
+
+#include "nec_pass.hpp"
+#include "work_times.hpp"
 #include "xcalib/edge_map.hpp"
 #include "xcalib/nec.hpp"
 
@@ -11,18 +15,25 @@ class ImagePair {
     virtual ~ImagePair() = default;
     // `rig` must have the level's sizes.
     virtual NecValue evaluate(const Rig& rig) const = 0;
-    // Gauss-Newton for 1 - evaluate(rig).nec. `count`: kNumWithoutReference or kNumParameters.
-    virtual NecNormalEquations normal_equations(const Rig& rig, int count) const = 0;
+    // Gauss-Newton for 1 - evaluate(rig).nec.
+    virtual NecNormalEquations normal_equations(const Rig& rig,
+                                                const Parameters& parameters) const = 0;
     virtual const Image& depth() const = 0;  // on the reference's grid [m]
+
+    std::shared_ptr<WorkTimes> times;  // receives, if any, what the above take
 };
 
 // Eq. (nec).
 class NecPair : public ImagePair {
    public:
     explicit NecPair(NecFrame frame) : frame_(std::move(frame)) {}
-    NecValue evaluate(const Rig& rig) const override { return evaluate_nec(frame_, rig); }
-    NecNormalEquations normal_equations(const Rig& rig, int count) const override {
-        return nec_normal_equations(frame_, rig, count);
+    NecValue evaluate(const Rig& rig) const override {
+        return value_of(frame_, nec_sums(frame_, rig, times.get()));
+    }
+    NecNormalEquations normal_equations(const Rig& rig,
+                                        const Parameters& parameters) const override {
+        const NecGram pass = nec_gram(frame_, rig, parameters, times.get());
+        return equations_from_gram(pass.gram, value_of(frame_, pass.sums));
     }
     const Image& depth() const override { return frame_.depth; }
 
@@ -36,13 +47,11 @@ class EdgePair : public ImagePair {
    public:
     EdgePair(EdgeMap reference, EdgeMap source, Image depth);
     NecValue evaluate(const Rig& rig) const override;
-    NecNormalEquations normal_equations(const Rig& rig, int count) const override;
+    NecNormalEquations normal_equations(const Rig& rig,
+                                        const Parameters& parameters) const override;
     const Image& depth() const override { return depth_; }
 
    private:
-    template <int kCount>
-    NecNormalEquations normal_equations_of(const Rig& rig) const;
-
     EdgeMap reference_, source_;
     Image depth_;
     double reference_energy_ = 0.0;

@@ -12,18 +12,6 @@ namespace {
 // Floats in, double sums.
 inline double squared(double x, double y) { return x * x + y * y; }
 
-NecValue value_from_sums(const NecFrame& frame, double aa, double vv, double av,
-                         double magnitudes) {
-    constexpr double kMeanCosine = 2 / 3.14159265358979323846;  // of unrelated directions
-    NecValue value;
-    value.norm = std::sqrt(aa * vv);
-    value.nec = value.norm > 0 ? av / value.norm : 0.0;
-    value.aligned =
-        value.norm > 0 ? (av - kMeanCosine * magnitudes) / ((1 - kMeanCosine) * value.norm) : 0.0;
-    value.valid_share = frame.reference_energy > 0 ? aa / frame.reference_energy : 0.0;
-    return value;
-}
-
 }  // namespace
 
 double nec(const Image& reference, const Image& registered, const std::uint8_t* valid,
@@ -131,9 +119,19 @@ NecFrame make_nec_frame(const Image& reference, const Image& source, const Image
     return frame;
 }
 
+NecValue value_of(const NecFrame& frame, const NecSums& sums) {
+    constexpr double kMeanCosine = 2 / 3.14159265358979323846;  // of unrelated directions
+    NecValue value;
+    value.norm = std::sqrt(sums.aa * sums.vv);
+    value.valid_share = frame.reference_energy > 0 ? sums.aa / frame.reference_energy : 0.0;
+    if (value.norm <= 0) return value;
+    value.nec = sums.av / value.norm;
+    value.aligned = (sums.av - kMeanCosine * sums.magnitudes) / ((1 - kMeanCosine) * value.norm);
+    return value;
+}
+
 NecValue evaluate_nec(const NecFrame& frame, const Rig& rig) {
-    const NecSums sums = nec_sums(frame, rig);
-    return value_from_sums(frame, sums.aa, sums.vv, sums.av, sums.magnitudes);
+    return value_of(frame, nec_sums(frame, rig));
 }
 
 NecNormalEquations equations_from_gram(const Eigen::MatrixXd& gram, const NecValue& value) {
@@ -152,26 +150,24 @@ NecNormalEquations equations_from_gram(const Eigen::MatrixXd& gram, const NecVal
     return out;
 }
 
-NecNormalEquations nec_normal_equations(const NecFrame& frame, const Rig& rig, int count) {
-    count = count <= kNumWithoutReference ? int{kNumWithoutReference} : int{kNumParameters};
-    const NecGram sums = nec_gram(frame, rig, count);
-    const Eigen::MatrixXd gram = sums.gram.selfadjointView<Eigen::Lower>();
-    return equations_from_gram(gram, value_from_sums(frame, sums.aa, gram(count, count),
-                                                     gram(count + 1, count), sums.magnitudes));
+NecNormalEquations nec_normal_equations(const NecFrame& frame, const Rig& rig,
+                                        const Parameters& parameters) {
+    const NecGram pass = nec_gram(frame, rig, parameters);
+    return equations_from_gram(pass.gram, value_of(frame, pass.sums));
 }
 
-NecRows nec_rows(const NecFrame& frame, const Rig& rig, int count) {
-    count = count <= kNumWithoutReference ? int{kNumWithoutReference} : int{kNumParameters};
+NecRows nec_rows(const NecFrame& frame, const Rig& rig, const Parameters& parameters) {
     Eigen::MatrixXd columns;
-    const NecGram sums = nec_gram(frame, rig, count, &columns);
+    const NecGram pass = nec_gram(frame, rig, parameters, nullptr, &columns);
+    const int count = parameters.size();
     const Eigen::Index edges = columns.cols();
     const Eigen::VectorXd v = columns.row(count), a = columns.row(count + 1);
     const Eigen::VectorXd unit = v.normalized();
     NecRows out;
     out.residuals.resize(edges + 1);
     // s r: the sign has no say in J^T J. Reference edges without a partner move with nothing.
-    out.residuals.head(edges) = a / std::sqrt(sums.aa) - unit;
-    out.residuals[edges] = std::sqrt(std::max(0.0, sums.aa - a.squaredNorm()) / sums.aa);
+    out.residuals.head(edges) = a / std::sqrt(pass.sums.aa) - unit;
+    out.residuals[edges] = std::sqrt(std::max(0.0, pass.sums.aa - a.squaredNorm()) / pass.sums.aa);
     out.jacobian = Eigen::MatrixXd::Zero(edges + 1, count);
     const Eigen::MatrixXd dv = columns.topRows(count).transpose();
     out.jacobian.topRows(edges) = -(dv - unit * (unit.transpose() * dv)) / v.norm();

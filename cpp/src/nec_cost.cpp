@@ -11,8 +11,8 @@ double NecCost::cost_of(const NecValue& value) const {
     return weight_ * (1 - value.nec + kChargeForOverlap * missing * missing);
 }
 
-CompressedBlock NecCost::linearized(const Rig& rig, int count) const {
-    const NecNormalEquations equations = pair_.normal_equations(rig, count);
+CompressedBlock NecCost::linearized(const Rig& rig, const Parameters& free) const {
+    const NecNormalEquations equations = pair_.normal_equations(rig, free);
     // With any amplitude k, r = A / sqrt(k) - s sqrt(k) B has the same cost up to a constant and
     // the same gradient, and k J^T J for a Hessian. Only edges that have a partner bend the cost,
     // so the k that predicts it is their share, not 1: about half of what direction alone shows to
@@ -25,7 +25,7 @@ CompressedBlock NecCost::linearized(const Rig& rig, int count) const {
         std::max(0.5 * std::max(equations.value.aligned, 0.1), explained / (2 * cost));
     block.jacobian *= std::sqrt(amplitude);
     block.residuals /= std::sqrt(amplitude);
-    block.residuals[count] = std::sqrt(std::max(0.0, 2 * cost - explained / amplitude));
+    block.residuals[free.size()] = std::sqrt(std::max(0.0, 2 * cost - explained / amplitude));
     return block;
 }
 

@@ -11,13 +11,12 @@ namespace xcalib {
 class NecCost : public RigCost {
    public:
     NecCost(const ImagePair& pair, const Rig& sizes, double weight, double minimum_share,
-            bool with_reference)
-        : RigCost(sizes, with_reference), pair_(pair), weight_(weight),
-          minimum_share_(minimum_share) {}
+            const Parameters& free)
+        : RigCost(sizes, free), pair_(pair), weight_(weight), minimum_share_(minimum_share) {}
 
    private:
     double cost(const Rig& rig) const override { return cost_of(pair_.evaluate(rig)); }
-    CompressedBlock linearized(const Rig& rig, int count) const override;
+    CompressedBlock linearized(const Rig& rig, const Parameters& free) const override;
     double cost_of(const NecValue& value) const;
 
     const ImagePair& pair_;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "work_times.hpp"
 #include "xcalib/nec.hpp"
 
 namespace xcalib {
@@ -16,19 +17,23 @@ struct NecSums {
     double av = 0;          // sum of |a n_R . v|
     double magnitudes = 0;  // sum of |a n_R| |v|
 };
-NecSums nec_sums(const NecFrame& frame, const Rig& rig);
+// `times`, if any, receives what it took.
+NecSums nec_sums(const NecFrame& frame, const Rig& rig, WorkTimes* times = nullptr);
 
-// Rows of [dv/dp (count), v, s a n_R], two (x and y) for each pixel where the source has an edge;
-// s is the polarity. `count` is kNumWithoutReference or kNumParameters.
+// Rows of [dv/dp ..., v, s a n_R], two (x and y) for each pixel where the source has an edge; s is
+// the polarity.
 struct NecGram {
-    double aa = 0, magnitudes = 0;
-    Eigen::MatrixXd gram;  // sum of the rows' outer products, (count + 2)^2, lower triangle
+    NecSums sums;
+    Eigen::MatrixXd gram;  // sum of the rows' outer products, to 1e-6 of the largest
 };
 // Where `rows` is given it receives the rows too, as its columns.
-NecGram nec_gram(const NecFrame& frame, const Rig& rig, int count, Eigen::MatrixXd* rows = nullptr);
+NecGram nec_gram(const NecFrame& frame, const Rig& rig, const Parameters& parameters,
+                 WorkTimes* times = nullptr, Eigen::MatrixXd* rows = nullptr);
 
-// The normal equations of 1 - A . V, A = a / ||a|| and V = v / ||v||, from the Gram matrix (all of
-// it) of the columns [dv/dp ..., v, a].
+NecValue value_of(const NecFrame& frame, const NecSums& sums);
+
+// The normal equations of 1 - A . V, A = a / ||a|| and V = v / ||v||, from the Gram matrix of the
+// columns [dv/dp ..., v, a].
 NecNormalEquations equations_from_gram(const Eigen::MatrixXd& gram, const NecValue& value);
 
 }  // namespace xcalib

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <mutex>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -48,13 +49,26 @@ void parallel_ranges(int count, int num_threads, const Work& work) {
         if (error) std::rethrow_exception(error);
 }
 
-// Calls work(index) for each index of [0, count), whichever thread is free taking the next.
+// Calls work(index) for each index of [0, count), whichever thread is free taking the next. The
+// exception of the lowest index is passed on: all below it have been taken before.
 template <class Work>
 void parallel_each(int count, int num_threads, const Work& work) {
     std::atomic<int> next{0};
+    std::mutex mutex;
+    int failed = count;
+    std::exception_ptr error;
     parallel_ranges(std::min(resolve_threads(num_threads), count), num_threads, [&](int, int) {
-        for (int i = next++; i < count; i = next++) work(i);
+        for (int i = next++; i < count; i = next++) try {
+                work(i);
+            } catch (...) {
+                next = count;
+                const std::lock_guard<std::mutex> lock(mutex);
+                if (i >= failed) continue;
+                failed = i;
+                error = std::current_exception();
+            }
     });
+    if (error) std::rethrow_exception(error);
 }
 
 }  // namespace xcalib

@@ -17,8 +17,11 @@ std::string CalibrationReport::brief() const {
 
 std::string CalibrationReport::full() const {
     std::string text = brief() + "\n";
-    text += format("working size %d x %d px; search %.1f s\n", working_width, working_height,
-                   search_seconds);
+    text += format(
+        "working size %d x %d px; of %.1f s, %.1f to prepare images, %.1f search, %.1f warp, "
+        "%.1f values, %.1f Jacobians, %.1f solver\n",
+        working_width, working_height, seconds, time.prepare, time.search, time.warp, time.value,
+        time.jacobian, time.solver);
     text += "candidate   score   corr  overlap  refined  HFoV reference / source [deg]\n";
     for (std::size_t i = 0; i < candidates.size(); ++i) {
         const CandidateReport& c = candidates[i];

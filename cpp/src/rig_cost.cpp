@@ -45,9 +45,9 @@ CompressedBlock compress(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& 
     return block;
 }
 
-RigCost::RigCost(const Rig& sizes, bool with_reference) : sizes_(sizes) {
+RigCost::RigCost(const Rig& sizes, const Parameters& free) : sizes_(sizes), free_(free) {
     for (const Block& block : kBlocks) mutable_parameter_block_sizes()->push_back(block.ambient);
-    set_num_residuals((with_reference ? kNumParameters : kNumWithoutReference) + 1);
+    set_num_residuals(free.size() + 1);
 }
 
 std::vector<double*> RigCost::blocks(SolverParameters& p) {
@@ -68,16 +68,21 @@ bool RigCost::Evaluate(double const* const* parameters, double* residuals,
         residuals[count] = std::sqrt(2 * cost(rig));
         return true;
     }
-    const CompressedBlock block = linearized(rig, count);
+    std::vector<double> at;
+    for (int b = 0; b < kNumBlocks; ++b)
+        at.insert(at.end(), parameters[b], parameters[b] + kBlocks[b].ambient);
+    if (at != last_at_) {
+        last_ = linearized(rig, free_);
+        last_at_ = at;
+    }
+    const CompressedBlock& block = last_;
     std::copy_n(block.residuals.data(), count + 1, residuals);
+    RowMajor all = RowMajor::Zero(count + 1, kNumParameters);
+    for (int i = 0; i < count; ++i) all.col(free_[i]) = block.jacobian.col(i);
     for (int b = 0; b < kNumBlocks; ++b) {
         if (!jacobians[b]) continue;
         Eigen::Map<RowMajor> out(jacobians[b], count + 1, kBlocks[b].ambient);
-        if (kBlocks[b].first >= count) {
-            out.setZero();
-            continue;
-        }
-        const auto columns = block.jacobian.middleCols(kBlocks[b].first, kBlocks[b].tangent);
+        const auto columns = all.middleCols(kBlocks[b].first, kBlocks[b].tangent);
         if (b != kRotationBlock) {
             out = columns;
             continue;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "xcalib/camera.hpp"
+#include "xcalib/warp.hpp"
 
 namespace xcalib {
 
@@ -29,15 +30,20 @@ class RigCost : public ceres::CostFunction {
     static std::vector<double*> blocks(SolverParameters& parameters);
 
    protected:
-    // `sizes`: a rig of the image sizes that `cost` and `linearized` are to get one of.
-    RigCost(const Rig& sizes, bool with_reference);
+    // `sizes`: a rig of the image sizes that `cost` and `linearized` are to get one of. `free`:
+    // what the solver may move, beyond which nothing is differentiated.
+    RigCost(const Rig& sizes, const Parameters& free);
 
     virtual double cost(const Rig& rig) const = 0;
-    // By the first `count` of `Parameter`, the reference's being the last.
-    virtual CompressedBlock linearized(const Rig& rig, int count) const = 0;
+    virtual CompressedBlock linearized(const Rig& rig, const Parameters& free) const = 0;
 
    private:
     Rig sizes_;
+    Parameters free_;
+    // The last linearization and where it was: Ceres calls each block from one thread at a time,
+    // and asks twice at the last place.
+    mutable std::vector<double> last_at_;
+    mutable CompressedBlock last_;
 };
 
 // A rotation that may pan and tilt but not roll: stage 1 freezes the roll.

@@ -1,8 +1,10 @@
 #include "xcalib/search.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
+#include <map>
 #include <mutex>
 #include <opencv2/core.hpp>
 
@@ -266,6 +268,14 @@ double distance(const Rig& a, const Rig& b) {
 std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& references,
                                            const std::vector<EdgeMap>& sources,
                                            const SearchSpace& space, int num_threads) {
+    struct Trial {
+        std::size_t source, roll;
+        double best = 0.0;  // score of a peak
+    };
+    std::vector<Trial> promising;  // of the first hypothesis
+    // One source pixel a map pixel: finer would alias. The same for all hypotheses.
+    std::vector<std::vector<EdgeMap>> reduced_sources;
+
     std::vector<Peak> all;
     std::vector<double> steps;
     std::mutex mutex;
@@ -273,62 +283,76 @@ std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& reference
         reduced_for(references, static_cast<double>(references[0].width) / space.map_width);
     for (std::size_t r = 0; r < space.hypotheses.size(); ++r) {
         const SearchHypothesis& hypothesis = space.hypotheses[r];
+        const std::size_t cameras = hypothesis.sources.size();
+        std::vector<Trial> trials;
+        for (const Trial& trial : promising)
+            if (trial.source < cameras) trials.push_back(trial);
+        for (std::size_t s = reduced_sources.size(); s < cameras; ++s)
+            for (std::size_t k = 0; k < space.rolls.size(); ++k) trials.push_back({s, k});
         const Pinhole camera =
             hypothesis.reference.resized(reference_maps[0].width, reference_maps[0].height);
         const double step = 1 / camera.fx;
         steps.push_back(step);
         const DirectionMap map = map_for(camera, step);
-        // Few transform sizes, so that the reference's spectra serve many source cameras.
-        const auto transform_size = [&](const DirectionMap& source_map) {
-            const auto round_up = [](int n) { return cv::getOptimalDFTSize((n + 31) / 32 * 32); };
-            return cv::Size(round_up(map.width + source_map.width),
-                            round_up(map.height + source_map.height));
-        };
         std::vector<DirectionMap> source_maps;
-        std::vector<cv::Size> sizes;
-        for (const Pinhole& source : hypothesis.sources) {
+        for (const Pinhole& source : hypothesis.sources)
             source_maps.push_back(map_for(source, step));
-            sizes.push_back(transform_size(source_maps.back()));
-        }
-        std::vector<cv::Size> distinct = sizes;
-        const auto less = [](const cv::Size& a, const cv::Size& b) {
-            return std::tie(a.width, a.height) < std::tie(b.width, b.height);
+        // Few transform sizes, so that the reference's spectra serve many source cameras.
+        const auto transform_size = [&](const Trial& trial) {
+            const DirectionMap& source_map = source_maps[trial.source];
+            const auto round_up = [](int n) { return cv::getOptimalDFTSize((n + 31) / 32 * 32); };
+            return std::array<int, 2>{round_up(map.width + source_map.width),
+                                      round_up(map.height + source_map.height)};
         };
-        std::sort(distinct.begin(), distinct.end(), less);
-        distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-        std::vector<CameraSpectra> reference_spectra(distinct.size());
-        parallel_ranges(static_cast<int>(distinct.size()), num_threads, [&](int begin, int end) {
-            for (int i = begin; i < end; ++i)
-                reference_spectra[i] = camera_spectra(reference_maps, map, camera,
-                                                      Eigen::Matrix3d::Identity(), distinct[i]);
+        std::map<std::array<int, 2>, CameraSpectra> reference_spectra;
+        for (const Trial& trial : trials) reference_spectra[transform_size(trial)];
+        std::vector<std::array<int, 2>> sizes;
+        for (const auto& [size, spectra] : reference_spectra) sizes.push_back(size);
+        parallel_each(static_cast<int>(sizes.size()), num_threads, [&](int i) {
+            reference_spectra[sizes[i]] =
+                camera_spectra(reference_maps, map, camera, Eigen::Matrix3d::Identity(),
+                               cv::Size(sizes[i][0], sizes[i][1]));
         });
-        parallel_each(static_cast<int>(hypothesis.sources.size()), num_threads, [&](int s) {
-            // One source pixel a map pixel: finer would alias.
-            const Pinhole& source = hypothesis.sources[s];
-            const std::vector<EdgeMap> source_reduced =
+        const std::size_t known = reduced_sources.size();
+        reduced_sources.resize(std::max(known, cameras));
+        parallel_each(static_cast<int>(reduced_sources.size() - known), num_threads, [&](int i) {
+            const Pinhole& source = hypothesis.sources[known + i];
+            reduced_sources[known + i] =
                 reduced_for(sources, source.fx / source.width * sources[0].width * step);
+        });
+        parallel_each(static_cast<int>(trials.size()), num_threads, [&](int i) {
+            Trial& trial = trials[i];
+            const std::vector<EdgeMap>& images = reduced_sources[trial.source];
             const Pinhole source_camera =
-                source.resized(source_reduced[0].width, source_reduced[0].height);
-            const std::size_t at =
-                std::lower_bound(distinct.begin(), distinct.end(), sizes[s], less) -
-                distinct.begin();
-            for (std::size_t k = 0; k < space.rolls.size(); ++k) {
-                const Eigen::Matrix3d source_from_map =
-                    space.base *
-                    Eigen::AngleAxisd(space.rolls[k], Eigen::Vector3d::UnitZ()).toRotationMatrix();
-                const CameraSpectra source_spectra = camera_spectra(
-                    source_reduced, source_maps[s], source_camera, source_from_map, sizes[s]);
-                std::vector<Peak> peaks = peaks_of(reference_spectra[at], source_spectra, map,
-                                                   source_maps[s], sizes[s], space);
-                const std::lock_guard<std::mutex> lock(mutex);
-                for (Peak& peak : peaks) {
-                    peak.reference = r;
-                    peak.source = static_cast<std::size_t>(s);
-                    peak.roll = k;
-                    all.push_back(peak);
-                }
+                hypothesis.sources[trial.source].resized(images[0].width, images[0].height);
+            const Eigen::Matrix3d source_from_map =
+                space.base * Eigen::AngleAxisd(space.rolls[trial.roll], Eigen::Vector3d::UnitZ())
+                                 .toRotationMatrix();
+            const auto size = transform_size(trial);
+            const cv::Size cv_size(size[0], size[1]);
+            const DirectionMap& source_map = source_maps[trial.source];
+            const CameraSpectra spectra =
+                camera_spectra(images, source_map, source_camera, source_from_map, cv_size);
+            std::vector<Peak> peaks =
+                peaks_of(reference_spectra.at(size), spectra, map, source_map, cv_size, space);
+            trial.best = peaks.empty() ? 0.0 : peaks[0].score;
+            const std::lock_guard<std::mutex> lock(mutex);
+            for (Peak& peak : peaks) {
+                peak.reference = r;
+                peak.source = trial.source;
+                peak.roll = trial.roll;
+                all.push_back(peak);
             }
         });
+        if (r == 0) {
+            // The field of view of the reference bends the map towards its rim, but hardly changes
+            // which scale and roll agree.
+            constexpr std::size_t kLeast = 12, kPart = 3;
+            const auto better = [](const Trial& a, const Trial& b) { return a.best > b.best; };
+            std::stable_sort(trials.begin(), trials.end(), better);
+            trials.resize(std::min(trials.size(), std::max(kLeast, trials.size() / kPart)));
+            promising = trials;
+        }
     }
     // Threads append in any order; the order here must not depend on it.
     std::sort(all.begin(), all.end(), [](const Peak& a, const Peak& b) {

@@ -33,7 +33,22 @@ class HoldCost : public ceres::CostFunction {
     std::vector<double> held_;
 };
 
-// Which blocks move in a stage: the paper's frozen sets.
+// What moves in a stage: all but the paper's frozen sets, and what is known.
+Parameters free_parameters(int stage, const CalibrationOptions& options) {
+    const bool source_free = !options.source_camera;
+    const bool reference_free = options.optimize_reference && !options.reference_camera;
+    Parameters free(0);
+    for (int p = 0; p < kNumParameters; ++p) {
+        const bool late = p == kRotationZ || p == kTranslationZ || p == kSourceCx ||
+                          p == kSourceCy || p == kSourceSkew || p >= kReferenceCx;
+        const bool known =
+            (p <= kSourceSkew && !source_free) || (p >= kReferenceLogFx && !reference_free);
+        if (!known && !(stage == 1 && late)) free.add(p);
+    }
+    return free;
+}
+
+// The same, as Ceres is told.
 void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
             const CalibrationOptions& options) {
     const bool source_known = options.source_camera.has_value();
@@ -118,14 +133,13 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     ceres::Problem problem;
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
+    const Parameters free = free_parameters(stage, options);
     for (std::size_t i = 0; i < level.pairs.size(); ++i)
-        problem.AddResidualBlock(new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit,
-                                             options.optimize_reference),
-                                 nullptr, blocks);
-    for (const FlowTargets& targets : flow)
         problem.AddResidualBlock(
-            new FlowCost(targets, options.flow_weight, options.optimize_reference), nullptr,
+            new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free), nullptr,
             blocks);
+    for (const FlowTargets& targets : flow)
+        problem.AddResidualBlock(new FlowCost(targets, options.flow_weight, free), nullptr, blocks);
     if (stage == 1 && options.prior_weight > 0) {
         const auto hold = [&](const double* from, int size, double delta, double* block) {
             problem.AddResidualBlock(
@@ -148,6 +162,10 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem, &summary);
+    const double own = summary.total_time_in_seconds - summary.residual_evaluation_time_in_seconds -
+                       summary.jacobian_evaluation_time_in_seconds;
+    if (const auto& times = level.pairs[0]->times)
+        times->solver += static_cast<std::int64_t>(1e9 * own);
 
     rig = rig_from_solver(p, rig.reference.width, rig.reference.height, rig.source.width,
                           rig.source.height);

@@ -37,7 +37,7 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
     } else if (options.reference_hfov_deg) {
         cameras = {camera_guess(reference, *options.reference_hfov_deg * kDegree)};
     } else {
-        for (double hfov : {40.0, 60.0, 82.0})
+        for (double hfov : {60.0, 40.0, 82.0})
             cameras.push_back(camera_guess(reference, hfov * kDegree));
     }
     for (const Pinhole& camera : cameras) {

@@ -90,6 +90,7 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<ImageView>& depths,
                                   const std::vector<int>& chosen, int working_width,
                                   int num_threads) {
+    const Clock::time_point start = Clock::now();
     const int reduction = (references[0].width + working_width - 1) / working_width;
     const int width = static_cast<int>(std::lround(references[0].width / double(reduction)));
     const int height = static_cast<int>(std::lround(references[0].height / double(reduction)));
@@ -102,40 +103,40 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     for (int factor : kFactors)
         images.pyramid[factor] = {std::vector<Image>(count), std::vector<Image>(count),
                                   std::vector<EdgeMap>(factor >= kCoarse ? count : 0)};
-    parallel_ranges(static_cast<int>(count), num_threads, [&](int begin, int end) {
-        for (int i = begin; i < end; ++i) {
-            const int frame = chosen[i];
-            for_frame("reference", frame, [&] {
-                images.references[i] =
-                    normalize_dark(resize_area(to_gray(references[frame]), width, height));
-            });
-            for_frame("source", frame,
-                      [&] { images.sources[i] = normalize_percentiles(to_gray(sources[frame])); });
-            images.source_edges[i] = edge_map(images.sources[i]);
-            images.reference_edges[i] = edge_map(images.references[i]);
-            Image depth;
-            for_frame("depth", frame, [&] {
-                depth = resize_depth(clean_depth(depths[frame]), width, height);
-                const auto& d = depth.pixels;
-                if (std::none_of(d.begin(), d.end(), [](float z) { return z > 0; }))
-                    throw std::invalid_argument(
-                        "no depth is known, expected finite metres > 0 in some pixels");
-            });
-            for (auto& [factor, level] : images.pyramid) {
-                const int w = std::max(1, static_cast<int>(std::lround(width / double(factor))));
-                const int h = std::max(1, static_cast<int>(std::lround(height / double(factor))));
-                level.references[i] = resize_area(images.references[i], w, h);
-                level.depths[i] = resize_depth(depth, w, h);
-                if (factor >= kCoarse) level.edges[i] = reduced(images.reference_edges[i], w, h);
-                else level.depths[i] = without_depth_edges(level.depths[i]);
-            }
+    parallel_each(static_cast<int>(count), num_threads, [&](int i) {
+        const int frame = chosen[i];
+        for_frame("reference", frame, [&] {
+            images.references[i] =
+                normalize_dark(resize_area(to_gray(references[frame]), width, height));
+        });
+        for_frame("source", frame,
+                  [&] { images.sources[i] = normalize_percentiles(to_gray(sources[frame])); });
+        images.source_edges[i] = edge_map(images.sources[i]);
+        images.reference_edges[i] = edge_map(images.references[i]);
+        Image depth;
+        for_frame("depth", frame, [&] {
+            depth = resize_depth(clean_depth(depths[frame]), width, height);
+            const auto& d = depth.pixels;
+            if (std::none_of(d.begin(), d.end(), [](float z) { return z > 0; }))
+                throw std::invalid_argument(
+                    "no depth is known, expected finite metres > 0 in some pixels");
+        });
+        for (auto& [factor, level] : images.pyramid) {
+            const int w = std::max(1, static_cast<int>(std::lround(width / double(factor))));
+            const int h = std::max(1, static_cast<int>(std::lround(height / double(factor))));
+            level.references[i] = resize_area(images.references[i], w, h);
+            level.depths[i] = resize_depth(depth, w, h);
+            if (factor >= kCoarse) level.edges[i] = reduced(images.reference_edges[i], w, h);
+            else level.depths[i] = without_depth_edges(level.depths[i]);
         }
     });
+    images.times->prepare += nanoseconds_since(start);
     return images;
 }
 
 WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) const {
     WorkingImages out;
+    out.times = times;
     for (std::size_t i : indices) {
         out.references.push_back(references[i]);
         out.sources.push_back(sources[i]);
@@ -180,22 +181,25 @@ Level level_for(const WorkingImages& images, int factor, int source_width, int s
     return level;
 }
 
-// Fills the level with make_pair(index).
+// Fills the level with make_pair(index). Its time is all preparation, weights included.
 template <class MakePair>
-void fill(Level& level, std::size_t count, const Rig& rig, int num_threads,
+void fill(Level& level, const WorkingImages& images, const Rig& rig, int num_threads,
           const MakePair& make_pair) {
+    const Clock::time_point start = Clock::now();
     const Rig at_level = level.rig_at(rig);
+    const std::size_t count = images.size();
     level.pairs.resize(count);
     level.weights.resize(count);
-    parallel_ranges(static_cast<int>(count), num_threads, [&](int begin, int end) {
-        for (int i = begin; i < end; ++i) {
-            level.pairs[i] = make_pair(i);
-            level.weights[i] = level.pairs[i]->evaluate(at_level).norm;
-        }
+    parallel_each(static_cast<int>(count), num_threads, [&](int i) {
+        auto pair = make_pair(i);
+        level.weights[i] = pair->evaluate(at_level).norm;
+        pair->times = images.times;
+        level.pairs[i] = std::move(pair);
     });
     const double sum = std::accumulate(level.weights.begin(), level.weights.end(), 0.0);
     for (double& weight : level.weights)
         weight = sum > 0 ? weight / sum : 1.0 / static_cast<double>(count);
+    images.times->prepare += nanoseconds_since(start);
 }
 
 }  // namespace
@@ -208,7 +212,7 @@ Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, in
     // Where the reference is finer than its partner, it is blurred to match.
     const double reference_blur = kBlur * std::max(1.0, 1 / density);
     const Rig at_level = level.rig_at(rig);
-    fill(level, images.size(), rig, num_threads, [&](int i) {
+    fill(level, images, rig, num_threads, [&](int i) {
         return std::make_unique<NecPair>(make_nec_frame(
             gaussian_blur(reduced.references[i], reference_blur),
             gaussian_blur(resize_area(images.sources[i], level.source_width, level.source_height),
@@ -228,7 +232,7 @@ Level make_level(const WorkingImages& images, int factor, const Rig& rig, int nu
     const EdgeMap& source = images.source_edges[0];
     Level level = level_for(images, factor, source.width, source.height, kEdgeDensity, rig);
     const ReducedImages& level_images = images.pyramid.at(factor);
-    fill(level, images.size(), rig, num_threads, [&](int i) {
+    fill(level, images, rig, num_threads, [&](int i) {
         return std::make_unique<EdgePair>(
             level_images.edges[i],
             reduced(images.source_edges[i], level.source_width, level.source_height),

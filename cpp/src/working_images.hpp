@@ -22,6 +22,8 @@ struct WorkingImages {
     std::vector<EdgeMap> reference_edges, source_edges;
     std::map<int, ReducedImages> pyramid;  // by the factor of kFactors
 
+    std::shared_ptr<WorkTimes> times = std::make_shared<WorkTimes>();  // of all pairs made of them
+
     std::size_t size() const { return references.size(); }
     // The pairs of these indices.
     WorkingImages subset(const std::vector<std::size_t>& indices) const;

@@ -289,8 +289,12 @@ class CalibrationReport:
     def seconds(self) -> float:
         """[s]"""
     @property
-    def search_seconds(self) -> float:
-        """[s]"""
+    def time(self) -> dict[str, float]:
+        """Where they go [s]: `prepare` (working images and their pyramid), `search`, `warp`
+        (reprojection and sampling of the passes over image pairs), `value` (the rest of the
+        passes without derivatives), `jacobian` (the rest of those with them), `solver` (Ceres
+        itself). Of what threads do side by side, their sum divided by their number.
+        """
     @property
     def working_width(self) -> int:
         """[px]"""

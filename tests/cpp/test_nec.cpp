@@ -114,8 +114,8 @@ TEST(Nec, NormalEquationsAreThoseOfTheRows) {
             ASSERT_GT(rows.jacobian.rows(), 500);
             const Eigen::MatrixXd hessian = rows.jacobian.transpose() * rows.jacobian;
             const Eigen::VectorXd gradient = rows.jacobian.transpose() * rows.residuals;
-            EXPECT_LT(relative_error(equations.hessian, hessian), 1e-9);
-            EXPECT_LT(relative_error(equations.gradient, gradient), 1e-9);
+            EXPECT_LT(relative_error(equations.hessian, hessian), 2e-7);
+            EXPECT_LT(relative_error(equations.gradient, gradient), 2e-7);
             EXPECT_EQ(equations.hessian, equations.hessian.transpose());
         }
 }

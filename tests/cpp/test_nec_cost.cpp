@@ -137,8 +137,10 @@ struct OnePair {
 
     OnePair(const NecFrame& frame, const Rig& rig, double weight, bool with_reference)
         : parameters(solver_from_rig(rig)), pair(frame) {
-        problem.AddResidualBlock(new NecCost(pair, rig, weight, 0.0, with_reference), nullptr,
-                                 NecCost::blocks(parameters));
+        problem.AddResidualBlock(
+            new NecCost(pair, rig, weight, 0.0,
+                        with_reference ? kNumParameters : kNumWithoutReference),
+            nullptr, NecCost::blocks(parameters));
         problem.SetManifold(parameters.quaternion, new ceres::QuaternionManifold);
     }
 
@@ -214,7 +216,7 @@ TEST(NecCost, GradientIsThatOfTheNormalEquationsTimesTheWeight) {
     expected.segment<3>(kRotationX) *= 2;  // Ceres' quaternion steps are half the angle
     ASSERT_EQ(found.size(), std::size_t{kNumParameters});
     for (int p = 0; p < kNumParameters; ++p)
-        EXPECT_NEAR(found[p], expected[p], 1e-9 * expected.norm()) << p;
+        EXPECT_NEAR(found[p], expected[p], 2e-7 * expected.norm()) << p;
 }
 
 TEST(NecCost, TheCostIsTheWeightTimesOneMinusNec) {
@@ -232,7 +234,7 @@ TEST(NecCost, TheCostWithDerivativesIsTheCostWithout) {
         std::vector<double> gradient;
         ASSERT_TRUE(pair.problem.Evaluate({}, &with, nullptr, &gradient, nullptr));
         // 1 - NEC of sums of floats: what it loses as it nears 0 is a rounding of 1.
-        EXPECT_NEAR(with, pair.cost(), 1e-5 * pair.cost() + 1e-9)
+        EXPECT_NEAR(with, pair.cost(), 1e-5 * pair.cost() + 1e-8)
             << "at " << off << " of the displacement";
     }
 }

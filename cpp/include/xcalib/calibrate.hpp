@@ -115,11 +115,22 @@ struct AdamStep {
     double total = 0.0;  // Eq. (total_loss)
 };
 
+// Where the time of a calibration goes [s]. Of what threads do side by side, their sum divided by
+// their number. What they leave is the verdict's bookkeeping, flow and waiting.
+struct CalibrationTimes {
+    double prepare = 0.0;   // working images and the levels of their pyramid
+    double search = 0.0;    // the global search
+    double warp = 0.0;      // reprojection and sampling of the passes over image pairs
+    double value = 0.0;     // the rest of the passes that have no derivatives
+    double jacobian = 0.0;  // the rest of those that have
+    double solver = 0.0;    // Ceres, but for its evaluations
+};
+
 struct CalibrationReport {
     bool converged = false;
     std::string message;  // one line: why the result is, or is not, to be trusted
     double seconds = 0.0;
-    double search_seconds = 0.0;
+    CalibrationTimes time;
     int working_width = 0, working_height = 0;
     double nec = 0.0;               // at the finest level
     double baseline_nec = 0.0;      // at half that size, of the rig turned off its place

@@ -65,14 +65,15 @@ struct NecValue {
 // `rig` must have the frame's sizes.
 NecValue evaluate_nec(const NecFrame& frame, const Rig& rig);
 
-// Gauss-Newton for 1 - NEC of one pair, by the parameters of `Parameter` in that order.
+// Gauss-Newton for 1 - NEC of one pair, by the parameters that were asked for, in their order.
 struct NecNormalEquations {
     NecValue value;
     Eigen::MatrixXd hessian;   // J^T J
     Eigen::VectorXd gradient;  // J^T r
 };
-// `count`: kNumWithoutReference, or kNumParameters to have the reference camera's too.
-NecNormalEquations nec_normal_equations(const NecFrame& frame, const Rig& rig, int count);
+// To 1e-6 of what would be had by doubles throughout; the others cost nothing.
+NecNormalEquations nec_normal_equations(const NecFrame& frame, const Rig& rig,
+                                        const Parameters& parameters);
 
 // The rows themselves, for tests and small images only: r and J, two rows for each pixel where both
 // images are sampled and the source has an edge, and one row for all that is left of the
@@ -81,6 +82,6 @@ struct NecRows {
     Eigen::VectorXd residuals;
     Eigen::MatrixXd jacobian;
 };
-NecRows nec_rows(const NecFrame& frame, const Rig& rig, int count);
+NecRows nec_rows(const NecFrame& frame, const Rig& rig, const Parameters& parameters);
 
 }  // namespace xcalib

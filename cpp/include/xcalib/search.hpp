@@ -13,13 +13,15 @@
 
 namespace xcalib {
 
-// A reference camera to try, and the source cameras to try with it.
+// A reference camera to try, and the source cameras to try with it. Source cameras of the same
+// place in two hypotheses have the same focal length, relative to the reference's.
 struct SearchHypothesis {
     Pinhole reference;
     std::vector<Pinhole> sources;
 };
 
 struct SearchSpace {
+    // Source cameras and rolls that do badly with the first are not tried with the others.
     std::vector<SearchHypothesis> hypotheses;
     std::vector<double> rolls;                           // [rad]
     Eigen::Matrix3d base = Eigen::Matrix3d::Identity();  // rotation that the search is centred on

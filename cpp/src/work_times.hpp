@@ -1,0 +1,33 @@
+// Where the time of a calibration goes, as it is added up while it runs.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+
+#include "xcalib/calibrate.hpp"
+
+namespace xcalib {
+
+using Clock = std::chrono::steady_clock;
+
+inline std::int64_t nanoseconds_since(Clock::time_point start) {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count();
+}
+
+struct WorkTimes {
+    std::atomic<std::int64_t> prepare{0}, solver{0};           // of the calling thread [ns]
+    std::atomic<std::int64_t> warp{0}, value{0}, jacobian{0};  // of all threads [ns]
+
+    CalibrationTimes seconds(int num_threads) const {
+        CalibrationTimes out;
+        out.prepare = 1e-9 * static_cast<double>(prepare);
+        out.solver = 1e-9 * static_cast<double>(solver);
+        out.warp = 1e-9 * static_cast<double>(warp) / num_threads;
+        out.value = 1e-9 * static_cast<double>(value) / num_threads;
+        out.jacobian = 1e-9 * static_cast<double>(jacobian) / num_threads;
+        return out;
+    }
+};
+
+}  // namespace xcalib
