@@ -42,12 +42,14 @@ bool known(float depth) { return depth > 0.0f && std::isfinite(depth); }
 // Depths within this ratio of one another are taken for one surface.
 constexpr float kSameSurface = 1.1f;
 
-float reduced_depth(const Image& depth, double x0, double x1, double y0, double y1) {
+// `values` is room that serves all pixels in turn.
+float reduced_depth(const Image& depth, double x0, double x1, double y0, double y1,
+                    std::vector<float>& values) {
     const int left = static_cast<int>(std::floor(x0 + 0.5));
     const int right = std::max(left + 1, static_cast<int>(std::floor(x1 + 0.5)));
     const int top = static_cast<int>(std::floor(y0 + 0.5));
     const int bottom = std::max(top + 1, static_cast<int>(std::floor(y1 + 0.5)));
-    std::vector<float> values;
+    values.clear();
     int cells = 0;
     for (int y = top; y < std::min(bottom, depth.height); ++y)
         for (int x = left; x < std::min(right, depth.width); ++x, ++cells)
@@ -190,10 +192,11 @@ Image resize_depth(const Image& depth, int width, int height) {
     const double sy = static_cast<double>(depth.height) / height;
     const bool reduces = sx > 1 && sy > 1;
     Image out(width, height);
+    std::vector<float> room;
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x)
             out.row(y)[x] =
-                reduces ? reduced_depth(depth, x * sx, (x + 1) * sx, y * sy, (y + 1) * sy)
+                reduces ? reduced_depth(depth, x * sx, (x + 1) * sx, y * sy, (y + 1) * sy, room)
                         : interpolated_depth(depth, (x + 0.5) * sx - 0.5, (y + 0.5) * sy - 0.5);
     return out;
 }
