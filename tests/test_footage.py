@@ -32,8 +32,9 @@ from xcalib.footage import (
     read_times,
     refine_offset,
 )
-from xcalib.footage.writer import VideoSink
+from xcalib.footage.writer import VideoSink, journal_of
 from xcalib.frames import DecodeError, Image, InputError, list_files, read_image, write_image
+from xcalib.journal import Journal
 
 Refused = Callable[..., str]
 
@@ -229,33 +230,39 @@ def test_halves(tmp_path: Path) -> None:
     ],
 )
 def test_what_a_video_cannot_hold(tmp_path: Path, name: str, image: Image, problem: str) -> None:
-    mask = np.zeros(image.shape[:2], np.uint8)
-    with pytest.raises(InputError, match=problem), VideoSink(tmp_path / name, 10) as sink:
-        sink.write("0", image, mask, None)
+    with pytest.raises(InputError, match=problem):
+        write_sink(tmp_path / name, [image])
     assert not list(tmp_path.iterdir())
 
 
+def write_sink(path: Path, frames: list[Image], overlay: Image | None = None) -> None:
+    with (
+        Journal(journal_of(path), {}) as journal,
+        VideoSink(path, 10, journal) as sink,
+    ):
+        sink.begin([str(index) for index in range(len(frames))])
+        for index, frame in enumerate(frames):
+            mask = np.full(frame.shape[:2], index, np.uint8)
+            sink.write(index, "", frame, mask, overlay)
+        sink.finish(lambda: None)
+
+
 def test_a_video_holds_frames_of_one_kind(tmp_path: Path) -> None:
-    """OpenCV leaves out frames of another kind without a word."""
-    mask = np.zeros((120, 160), np.uint8)
-    with VideoSink(tmp_path / "a.mkv", 10) as sink:
-        sink.write("", moving(1)[0], mask, None)
-        with pytest.raises(InputError, match=r"a frame is \(120, 160, 3, 'uint8'\), the first is"):
-            sink.write("", moving(1, channels=3)[0], mask, None)
+    frames = [moving(1)[0], moving(1, channels=3)[0]]
+    with pytest.raises(InputError, match=r"a frame is \(120, 160, 3, 'uint8'\), the first is"):
+        write_sink(tmp_path / "a.mkv", frames)
 
 
 def test_a_video_is_whole_or_absent(tmp_path: Path) -> None:
     frames = moving(3, np.uint16)
-    mask = np.full((120, 160), 2, np.uint8)
-    with VideoSink(tmp_path / "a.mkv", 10) as sink:
-        for frame in frames:
-            sink.write("", frame, mask, None)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.masks.mkv", "a.mkv"]
+    write_sink(tmp_path / "a.mkv", frames)
+    names = ["a.masks.mkv", "a.mkv", "a.register.jsonl"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
     np.testing.assert_array_equal(open_stream(tmp_path / "a.mkv")[2], frames[2])
-    np.testing.assert_array_equal(open_stream(tmp_path / "a.masks.mkv")[1], mask)
-    with pytest.raises(InputError), VideoSink(tmp_path / "b.mkv", 10) as sink:
-        sink.write("", frames[0], mask, np.zeros((2, 2), np.float32))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.masks.mkv", "a.mkv"]
+    np.testing.assert_array_equal(open_stream(tmp_path / "a.masks.mkv")[1], np.ones((120, 160)))
+    with pytest.raises(InputError):
+        write_sink(tmp_path / "b.mkv", frames, overlay=np.zeros((2, 2), np.float32))
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
 
 
 # -- Bags

@@ -42,10 +42,10 @@ from .pipeline import (
     left_out,
     progress,
     run_calibration,
-    run_registration,
     save_rig,
     with_fitted_plane,
 )
+from .registration import RegistrationOptions, run_registration
 
 FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
 DEFAULTS = CalibrationOptions()
@@ -72,8 +72,8 @@ class Commands(click.Group):
             raise  # these are click's own control flow, and RuntimeErrors
         except click.ClickException as error:
             stop(WRONG_INPUT, error.format_message())
-        except KeyboardInterrupt:
-            stop(FAILED, "interrupted")
+        except KeyboardInterrupt as error:
+            stop(FAILED, str(error) or "interrupted")
         except OSError as error:
             if error.errno == errno.EPIPE:
                 raise  # the reader of our output left: click ends quietly
@@ -430,6 +430,11 @@ def finite(value: Any) -> Any:
 )
 @click.option("--overlay", "overlays", is_flag=True, help="Also write red-cyan overlays/.")
 @click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Begin anew.  [default: go on where an interrupted run of the same command ended]",
+)
+@click.option(
     "--nearest",
     is_flag=True,
     help="Take the nearest source pixel as it is: radiometric counts are never mixed."
@@ -448,6 +453,7 @@ def register_command(
     rig_file: Path,
     output: Path,
     overlays: bool,
+    overwrite: bool,
     nearest: bool,
     occlusion: str,
     threads: int,
@@ -457,6 +463,8 @@ def register_command(
     """Bring every SOURCE image onto the pixels of its REFERENCE image.
 
     Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
+
+    Interrupted, the same command goes on where it ended: no frame is lost or made twice.
     """
     rig = Rig.load(rig_file)
     frames = open_frames(inputs, threads, rig)
@@ -464,7 +472,8 @@ def register_command(
         if Path(inputs[name]).resolve() == output.resolve():
             raise InputError(f"output folder {output} is an input folder, expected another")
     (check_file_writable if is_video(output) else check_folder_writable)(output)
-    total = run_registration(frames, rig, output, threads, overlays, quiet, nearest, occlusion)
+    how = RegistrationOptions(threads, overlays, nearest, occlusion, overwrite)
+    total = run_registration(frames, rig, output, how, inputs, quiet)
     click.echo(f"{total.summary()}: {output}")
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")

@@ -14,7 +14,8 @@ from . import synthetic
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig
 from .frames import Image, check_folder_writable, display_gray, overlay, size_of, write_image
 from .inspection import vector
-from .pipeline import Frames, progress, run_calibration, run_registration, save_rig
+from .pipeline import Frames, progress, run_calibration, save_rig
+from .registration import RegistrationOptions, run_registration
 
 
 def run_demo(
@@ -47,7 +48,8 @@ def run_demo(
     frames = Frames(references, sources, everything.depth)
     result, _ = run_calibration(frames, CalibrationOptions(seed=seed), quiet=quiet)
     save_rig(result.rig, output / "rig.yaml")
-    total = run_registration(frames, result.rig, output / "registered", quiet=quiet)
+    options = RegistrationOptions(overwrite=True)
+    total = run_registration(frames, result.rig, output / "registered", options, quiet=quiet)
 
     say(result.report.brief())
     say(against_truth(result.rig, truth, frames))

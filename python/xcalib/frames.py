@@ -14,6 +14,7 @@ import contextlib
 import os
 import re
 import tempfile
+import threading
 from collections.abc import Callable, Collection, Hashable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -150,14 +151,28 @@ def as_image(pixels: Image, where: str) -> Image:
     return np.ascontiguousarray(pixels)
 
 
+_quiet = threading.Lock()
+_quiet_level, _quiet_users = 0, 0
+
+
 @contextlib.contextmanager
 def quiet_opencv() -> Iterator[None]:
-    """Without OpenCV's own words on a bad file: they would come between our line and its reader."""
-    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    """Without OpenCV's own words on a bad file: they would come between our line and its reader.
+
+    The level is the whole process's: the first thread in takes it down, the last one out back up.
+    """
+    global _quiet_level, _quiet_users
+    with _quiet:
+        if not _quiet_users:
+            _quiet_level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        _quiet_users += 1
     try:
         yield
     finally:
-        cv2.utils.logging.setLogLevel(level)
+        with _quiet:
+            _quiet_users -= 1
+            if not _quiet_users:
+                cv2.utils.logging.setLogLevel(_quiet_level)
 
 
 def decode(path: Path) -> Image:

@@ -1,12 +1,8 @@
-"""From frames on disk to a rig, and to registered frames on disk.
-
-What the commands do, with progress bars on stderr; the commands themselves are in `cli`.
-"""
+"""From frames on disk to a rig, with progress bars on stderr. `registration` goes on from there."""
 
 from __future__ import annotations
 
 import re
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, calibrate, choose_frames
+from ._core import CalibrationOptions, CalibrationResult, Rig, calibrate, choose_frames
 from .choose import Choice, choose_informed
 from .depth import (
     PNG_SCALE,
@@ -30,10 +26,9 @@ from .depth import (
 )
 from .depth.plane_fit import fit_plane, spread
 from .flow import FlowProvider
-from .footage import Matching, Pairs, Stream, TopicDepth, open_pairs, open_sink
+from .footage import Matching, Pairs, Stream, TopicDepth, open_pairs
 from .footage.opening import PickedDepth
-from .footage.pairing import median_period
-from .frames import DecodeError, Image, InputError, fit_rig, overlay, size_of
+from .frames import DecodeError, Image, InputError, fit_rig, size_of
 from .thermal import scalar_sources
 
 T = TypeVar("T")
@@ -277,57 +272,3 @@ def save_rig(rig: Rig, path: Path) -> None:
     """Write a rig file, and make its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     rig.save(path)
-
-
-@dataclass
-class Registration:
-    """Totals over a stream of registered frames."""
-
-    frames: int = 0
-    valid: int = 0
-    pixels: int = 0
-    seconds: float = 0.0
-
-    def summary(self) -> str:
-        """One line."""
-        share = 100 * self.valid / self.pixels
-        speed = self.frames / max(self.seconds, 1e-9)
-        return f"{self.frames} frames, {share:.1f} % valid, {speed:.1f} frames/s with files"
-
-
-def frame_rate(stream: Stream) -> float:
-    """Frames a second, by the median; 25 where the stream does not tell."""
-    period = 0.0 if stream.times is None else median_period(stream.times)
-    return 1 / period if period else 25.0
-
-
-def run_registration(
-    frames: Frames,
-    rig: Rig,
-    output: Path,
-    threads: int = 0,
-    overlays: bool = False,
-    quiet: bool = False,
-    nearest: bool = False,
-    occlusion: str = "mark",
-) -> Registration:
-    """Register frame by frame and write images, masks and, if asked for, overlays.
-
-    ``output`` is a folder, or a video by its suffix, at the rate of the reference. ``nearest``
-    keeps the source's values as they are instead of interpolating between them; ``occlusion`` is
-    that of `Registrar`.
-    """
-    registrar = Registrar(frames.fit(rig), threads, nearest, occlusion)
-    total = Registration()
-    start = time.perf_counter()
-    with open_sink(output, frame_rate(frames.references)) as sink:
-        for index in progress(range(len(frames)), len(frames), "registering", quiet):
-            reference, source, depth = frames.read(index)
-            image, mask = registrar.register(source, depth)
-            picture = overlay(reference, image, mask == 0) if overlays else None
-            sink.write(frames.references.name(index), image, mask, picture)
-            total.frames += 1
-            total.valid += int(np.count_nonzero(mask == 0))
-            total.pixels += mask.size
-    total.seconds = time.perf_counter() - start
-    return total

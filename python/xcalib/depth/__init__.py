@@ -15,7 +15,7 @@ from .files import DEPTH_SUFFIXES, PNG_SCALE, FolderDepth, read_depth
 from .measured import MeasuredDepth
 from .network import NetworkDepth, NetworkOptions
 from .plane import PlaneDepth
-from .provider import Depth, DepthProvider
+from .provider import Depth, DepthProvider, files_of, is_parallel
 
 __all__ = [
     "DEPTH_SUFFIXES",
@@ -27,6 +27,8 @@ __all__ = [
     "NetworkDepth",
     "NetworkOptions",
     "PlaneDepth",
+    "files_of",
+    "is_parallel",
     "open_depth",
     "read_depth",
 ]

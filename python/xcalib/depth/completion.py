@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import Image, InputError, gray, same_aspect, size_of
-from .provider import Depth, DepthProvider, reciprocal
+from .provider import Depth, DepthProvider, is_parallel, reciprocal
 
 Array = NDArray[Any]
 """float32."""
@@ -45,6 +45,11 @@ class CompletedDepth:
             raise InputError(
                 f"completion confidence is {self.min_confidence:g}, expected between 0 and 1"
             )
+
+    @property
+    def parallel(self) -> bool:
+        """See `depth.is_parallel`."""
+        return is_parallel(self.provider)
 
     def __call__(self, index: int, reference: Image) -> Depth:
         dense, confidence = complete(self.provider(index, reference), reference)

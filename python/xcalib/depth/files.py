@@ -23,6 +23,8 @@ PNG_SCALE = 1 / 256
 class FolderDepth:
     """Depth maps of a folder, one per reference image, paired with them by `frames.pair`."""
 
+    parallel = True
+
     def __init__(
         self, folder: str | Path, reference_paths: Sequence[Path], scale: float = PNG_SCALE
     ) -> None:

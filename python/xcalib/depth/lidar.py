@@ -96,6 +96,8 @@ class LidarDepth:
     ``calibration`` is one file for all, or a folder with one of KITTI's files per scan.
     """
 
+    parallel = True
+
     def __init__(
         self, folder: str | Path, reference_paths: Sequence[Path], calibration: str | Path
     ) -> None:

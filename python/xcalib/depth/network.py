@@ -152,6 +152,11 @@ class NetworkDepth:
             maps.append(values[np.isfinite(values)])
         return normalization(np.concatenate(maps))
 
+    def files(self, index: int) -> list[Path]:
+        """See `depth.files_of`: the model, and the recipe beside it."""
+        beside = self.path.with_suffix(".yaml")
+        return [self.path, beside] if beside.is_file() else [self.path]
+
     # -- Running ---------------------------------------------------------------------------------
 
     def _raws(self, references: Sequence[Image]) -> list[_Raw]:

@@ -31,6 +31,8 @@ class PlaneDepth:
     roll_deg: float = 0.0
     """How far the horizon falls towards the right [deg], (-45, 45)."""
 
+    parallel = True
+
     def __post_init__(self) -> None:
         for name, low, high, unit in (
             ("camera_height", 0.0, math.inf, "m"),

@@ -121,6 +121,8 @@ def _matched(
 class StereoDepth:
     """Depth from a folder of the partner's images, paired with the references by `frames.pair`."""
 
+    parallel = True
+
     def __init__(
         self,
         folder: str | Path,

@@ -17,7 +17,7 @@ from .sources import open_stream
 from .stream import Part, Picked, Stream
 from .times import read_times
 from .video import VIDEO_SUFFIXES, Video
-from .writer import Sink, is_video, open_sink
+from .writer import Sink, is_video, journal_of, open_sink
 
 __all__ = [
     "METHODS",
@@ -41,6 +41,7 @@ __all__ = [
     "estimate_offset",
     "is_bag",
     "is_video",
+    "journal_of",
     "match_depths",
     "offsets_around",
     "open_pairs",

@@ -124,6 +124,9 @@ class BagImages(Stream):
     def where(self, index: int) -> str:
         return f"{self.path}#{self.topic} frame {index}"
 
+    def file(self, index: int) -> Path:
+        return self.path
+
 
 def _opened(path: Path) -> AnyReader:
     try:

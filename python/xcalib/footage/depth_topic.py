@@ -42,3 +42,7 @@ class TopicDepth:
             )
         metres = image * MILLIMETRE if image.dtype == np.uint16 else image
         return fitting(known(metres.astype(np.float32), where), reference, where)
+
+    def files(self, index: int) -> list[Path]:
+        """See `depth.files_of`."""
+        return [self.stream.file(index)]

@@ -31,6 +31,8 @@ TIME_TABLES = ("timestamps.csv", "timestamps.txt")
 class ImageFiles(Stream):
     """A list of image files; their times stand in their names or in a table beside them."""
 
+    parallel = True
+
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = list(paths)
         self.times = times_of_names([path.stem for path in self.paths])
@@ -49,6 +51,9 @@ class ImageFiles(Stream):
 
     def where(self, index: int) -> str:
         return str(self.paths[index])
+
+    def file(self, index: int) -> Path:
+        return self.paths[index]
 
 
 def matching_files(pattern: Path) -> list[Path]:
@@ -71,6 +76,8 @@ def matching_files(pattern: Path) -> list[Path]:
 
 class Pages(Stream):
     """The pages of a TIFF stack."""
+
+    parallel = True
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -96,6 +103,9 @@ class Pages(Stream):
 
     def where(self, index: int) -> str:
         return f"{self.path} page {index}"
+
+    def file(self, index: int) -> Path:
+        return self.path
 
 
 def open_files(path: Path) -> Stream | None:

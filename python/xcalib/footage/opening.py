@@ -19,6 +19,8 @@ from ..depth import (
     MeasuredDepth,
     NetworkOptions,
     PlaneDepth,
+    files_of,
+    is_parallel,
     open_depth,
 )
 from ..depth.points import POINT_SUFFIXES
@@ -58,8 +60,17 @@ class PickedDepth:
     depth: DepthProvider
     indices: list[int]
 
+    @property
+    def parallel(self) -> bool:
+        """See `depth.is_parallel`."""
+        return is_parallel(self.depth)
+
     def __call__(self, index: int, reference: Image) -> Depth:
         return self.depth(self.indices[index], reference)
+
+    def files(self, index: int) -> list[Path]:
+        """See `depth.files_of`."""
+        return files_of(self.depth, self.indices[index])
 
 
 @dataclass(frozen=True)

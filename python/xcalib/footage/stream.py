@@ -25,6 +25,8 @@ class Stream(Sequence[Image]):
 
     times: Times | None = None
     """(N,) seconds of the frames, never falling; None where unknown. Each stream has its clock."""
+    parallel = False
+    """Whether several threads may read at a time, after a first frame was read."""
     _first: tuple[str, Size] | None = None
 
     @abstractmethod
@@ -41,6 +43,10 @@ class Stream(Sequence[Image]):
     @abstractmethod
     def where(self, index: int) -> str:
         """Where the frame is, for messages: a file, or a file and the frame's number."""
+
+    def file(self, index: int) -> Path:
+        """The file that the frame is in, or the folder of a bag."""
+        return Path(self.where(index))
 
     @overload
     def __getitem__(self, index: int) -> Image: ...
@@ -71,6 +77,7 @@ class Picked(Stream):
 
     def __init__(self, stream: Stream, indices: Sequence[int]) -> None:
         self.stream, self.indices = stream, indices
+        self.parallel = stream.parallel
         if stream.times is not None:
             self.times = stream.times[np.asarray(indices, np.intp)]
 
@@ -86,13 +93,16 @@ class Picked(Stream):
     def where(self, index: int) -> str:
         return self.stream.where(self.indices[index])
 
+    def file(self, index: int) -> Path:
+        return self.stream.file(self.indices[index])
+
 
 class Converted(Stream):
     """A stream whose frames are passed through ``convert`` as they are read."""
 
     def __init__(self, stream: Stream, convert: Callable[[Image], Image]) -> None:
         self.stream, self.convert = stream, convert
-        self.times = stream.times
+        self.times, self.parallel = stream.times, stream.parallel
 
     def __len__(self) -> int:
         return len(self.stream)
@@ -106,6 +116,9 @@ class Converted(Stream):
     def where(self, index: int) -> str:
         return self.stream.where(index)
 
+    def file(self, index: int) -> Path:
+        return self.stream.file(index)
+
 
 class Part(Stream):
     """A half of every frame: two cameras side by side, or one above the other, in one stream."""
@@ -114,7 +127,7 @@ class Part(Stream):
 
     def __init__(self, stream: Stream, half: str) -> None:
         self.stream, self.half = stream, half
-        self.times = stream.times
+        self.times, self.parallel = stream.times, stream.parallel
 
     def __len__(self) -> int:
         return len(self.stream)
@@ -137,3 +150,6 @@ class Part(Stream):
 
     def where(self, index: int) -> str:
         return f"{self.stream.where(index)} ({self.half} half)"
+
+    def file(self, index: int) -> Path:
+        return self.stream.file(index)

@@ -106,3 +106,6 @@ class Video(Stream):
 
     def where(self, index: int) -> str:
         return f"{self.path} frame {index}"
+
+    def file(self, index: int) -> Path:
+        return self.path

@@ -1,0 +1,201 @@
+"""Videos written through PyAV, FFmpeg's libraries: encoded, checked, and joined without decoding.
+
+OpenCV writes videos too, but tells of no error (a full disk leaves half a video behind), and cannot
+copy compressed frames from one file to another.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+
+from ..frames import Image, InputError, size_of
+
+# Container, codec and the pixels it stores; None: as they are. The quantizer of the lossy ones is
+# fixed, so that a frame's quality does not depend on where a part began.
+_QUALITY = {"flags": "+qscale", "global_quality": str(2 * 118)}
+_KINDS: dict[str, tuple[str, str, str | None, dict[str, str]]] = {
+    ".mp4": ("mp4", "mpeg4", "yuv420p", _QUALITY),
+    ".avi": ("avi", "mjpeg", "yuvj420p", _QUALITY),
+    # Slices are coded by threads of their own, and must be as many in all parts.
+    ".mkv": ("matroska", "ffv1", None, {"level": "3", "slices": "4"}),
+}
+SUFFIXES = tuple(_KINDS)
+
+# How arrays are called by their type and number of dimensions, and what FFV1 stores them as.
+_PIXELS = {("uint8", 2): "gray", ("uint16", 2): "gray16le", ("uint8", 3): "bgr24"}
+_LOSSLESS = {"gray": "gray", "gray16le": "gray16le", "bgr24": "bgr0"}
+
+
+def check_image(path: Path, image: Image) -> None:
+    """Raise `InputError` if a video of this name cannot hold the image.
+
+    .mp4 and .avi hold 8-bit images, compressed with loss; .mkv holds 8-bit and 16-bit gray images
+    without loss (FFV1). No video holds float32 or 16-bit colour, nor odd sizes.
+    """
+    suffix = path.suffix.lower()
+    deep = image.dtype == np.uint16 and image.ndim == 2 and suffix == ".mkv"
+    if image.dtype != np.uint8 and not deep:
+        kind = f"{image.dtype} {'gray' if image.ndim == 2 else 'colour'}"
+        raise InputError(
+            f"{path}: the images are {kind}; {suffix} holds uint8"
+            + (" and gray uint16" if suffix == ".mkv" else "")
+            + ", a folder holds any"
+        )
+    width, height = size_of(image)
+    if width % 2 or height % 2:
+        raise InputError(
+            f"{path}: the images are {width}x{height}; a video holds even sizes, a folder any"
+        )
+
+
+class Encoder:
+    """Compresses frames into a part of a video: a Matroska file, whole once it is closed.
+
+    Parameters
+    ----------
+    path
+        The part.
+    target
+        The video it becomes a part of: its suffix says the codec, and messages name it.
+    first
+        An image like all that follow.
+    rate
+        Frames a second.
+    """
+
+    def __init__(self, path: Path, target: Path, first: Image, rate: float) -> None:
+        self.path, self.target = path, target
+        self._partial = path.with_name(f"{path.name}.partial")
+        self._like = (*first.shape, str(first.dtype))
+        self._pixels = _PIXELS[str(first.dtype), first.ndim]
+        self._frames = 0
+        _, codec, stored, options = _KINDS[target.suffix.lower()]
+        with _named(target):
+            self._container = av.open(str(self._partial), "w", format="matroska")
+            stream = self._container.add_stream(codec, rate=_fraction(rate), options=options)
+            assert isinstance(stream, av.VideoStream)
+            self._stream = stream
+            self._stream.width, self._stream.height = size_of(first)
+            self._stream.pix_fmt = stored or _LOSSLESS[self._pixels]
+            self._stream.codec_context.thread_type = "SLICE"
+
+    def write(self, image: Image) -> None:
+        """Add a frame."""
+        kind = (*image.shape, str(image.dtype))
+        if kind != self._like:
+            raise InputError(
+                f"{self.target}: a frame is {kind}, the first is {self._like}; a video holds"
+                " frames of one kind, a folder any"
+            )
+        with _named(self.target):
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format=self._pixels)
+            frame.pts = self._frames
+            self._container.mux(self._stream.encode(frame))
+        self._frames += 1
+
+    def close(self, frames: int) -> None:
+        """Make the part whole; OSError if it does not hold at least ``frames`` frames then."""
+        with _named(self.target):
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+        _check_count(self._partial, frames, self.target)
+        os.replace(self._partial, self.path)
+
+    def discard(self) -> None:
+        """Leave nothing behind, unless it was closed."""
+        with contextlib.suppress(OSError, ValueError, av.FFmpegError):
+            self._container.close()
+        self._partial.unlink(missing_ok=True)
+
+
+def join(
+    parts: Sequence[tuple[Path, int]], target: Path, rate: float, check: Callable[[], None]
+) -> None:
+    """Write a video, whole or not at all, of the compressed frames of its parts.
+
+    Parameters
+    ----------
+    parts
+        Files of `Encoder`, and how many frames to take of each.
+    target
+        The video.
+    rate
+        Frames a second.
+    check
+        Called for every frame; what it raises ends the writing.
+    """
+    partial = target.with_name(f".{target.stem}.{os.getpid()}.partial{target.suffix}")
+    step = 1 / _fraction(rate)
+    frames, described = 0, None
+    try:
+        with _named(target), av.open(str(partial), "w", format=_format(target)) as container:
+            stream = None
+            for path, count in parts:
+                with av.open(str(path)) as part:
+                    source = part.streams.video[0]
+                    if stream is None:
+                        stream = container.add_stream_from_template(source)
+                        stream.time_base = step
+                        described = source.codec_context.extradata
+                    if source.codec_context.extradata != described:
+                        raise OSError(f"{path}: coded otherwise than the parts before it")
+                    for packet in _packets(part, count):
+                        check()
+                        packet.stream = stream
+                        packet.time_base = step
+                        packet.pts = packet.dts = frames
+                        packet.duration = 1
+                        container.mux(packet)
+                        frames += 1
+        _check_count(partial, sum(count for _, count in parts), target)
+        os.replace(partial, target)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _format(target: Path) -> str:
+    return _KINDS[target.suffix.lower()][0]
+
+
+def _packets(container: av.container.InputContainer, count: int) -> Iterator[av.Packet[Any]]:
+    """The first compressed frames of a file, in order."""
+    for packet in container.demux(video=0):
+        if packet.size and count > 0:
+            count -= 1
+            yield packet
+
+
+def _check_count(path: Path, frames: int, target: Path) -> None:
+    """Raise OSError if fewer frames arrived on the disk."""
+    try:
+        with _named(target), av.open(str(path)) as container:
+            found = sum(1 for _ in _packets(container, frames))
+    except (OSError, ValueError) as error:
+        raise OSError(f"{target}: could not be written: {error}") from None
+    if found < frames:
+        raise OSError(
+            f"{target}: {found} of {frames} frames could be written; is there space on the disk?"
+        )
+
+
+@contextlib.contextmanager
+def _named(target: Path) -> Iterator[None]:
+    """FFmpeg's errors as OSError with the file the user knows."""
+    try:
+        yield
+    except av.FFmpegError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from None
+
+
+def _fraction(rate: float) -> Fraction:
+    """A rate whose time base MPEG-4 can hold: both terms fit 16 bits."""
+    rate = min(max(rate, 0.01), 65535.0)
+    return Fraction(rate).limit_denominator(min(1001, int(65535 / rate)))
