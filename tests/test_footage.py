@@ -256,7 +256,7 @@ def test_a_video_holds_frames_of_one_kind(tmp_path: Path) -> None:
 def test_a_video_is_whole_or_absent(tmp_path: Path) -> None:
     frames = moving(3, np.uint16)
     write_sink(tmp_path / "a.mkv", frames)
-    names = ["a.masks.mkv", "a.mkv", "a.register.jsonl"]
+    names = ["a.masks.mkv", "a.mkv", "a.mkv.register.jsonl"]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     np.testing.assert_array_equal(open_stream(tmp_path / "a.mkv")[2], frames[2])
     np.testing.assert_array_equal(open_stream(tmp_path / "a.masks.mkv")[1], np.ones((120, 160)))

@@ -151,7 +151,8 @@ class Journal:
             os.ftruncate(self._descriptor, 0)
             self._write(self._first)
             return
-        os.ftruncate(self._descriptor, len(whole))
+        if len(whole) < len(data):
+            os.ftruncate(self._descriptor, len(whole))
         self.units = [unit for unit in units if self.is_whole(unit)]
 
 

@@ -99,8 +99,9 @@ class FolderSink:
 class VideoSink:
     """One video; beside it ``NAME.masks.mkv``, lossless, and ``NAME.overlay`` with its suffix.
 
-    A video cannot be appended to. Frames go to parts of `PART` frames in the folder ``NAME.parts``;
-    `finish` copies the compressed frames of all parts into the videos, and removes the parts.
+    A video cannot be appended to. Frames go to parts of `PART` frames in a folder with ``.parts``
+    behind the video's name; `finish` copies the compressed frames of all parts into the videos, and
+    removes the parts.
     """
 
     parallel = False
@@ -109,7 +110,7 @@ class VideoSink:
 
     def __init__(self, path: Path, rate: float, journal: Journal) -> None:
         self.path, self.rate, self.journal = path, rate, journal
-        self.parts = path.with_suffix(".parts")
+        self.parts = path.with_name(f"{path.name}.parts")
         self._places: dict[str, int] = {}
         self._keys: Sequence[str] = ()
         self._open: dict[str, Encoder] = {}
@@ -224,8 +225,9 @@ def open_sink(output: Path, rate: float, journal: Journal) -> Sink:
 
 
 def journal_of(output: Path) -> Path:
-    """Where the journal of an output is: in the folder, or beside the video."""
-    return output.with_suffix(".register.jsonl") if is_video(output) else output / "register.jsonl"
+    """Where the journal of an output is: in the folder, or beside the video, named after it."""
+    name = "register.jsonl"
+    return output.with_name(f"{output.name}.{name}") if is_video(output) else output / name
 
 
 def is_video(output: Path) -> bool:
