@@ -119,11 +119,14 @@ def run_registration(
     ):
         done = sink.begin(keys)
         todo = [key not in done for key in keys]
-        stages = stages_of(frames, registrar, sink, todo, options)
-        valid, made = sum(done.values()), 0
-        start = time.perf_counter()
         if overlapped is None:
             overlapped = options.threads != 1
+        workers = min(options.threads or len(os.sched_getaffinity(0)), WORKERS)
+        stages = stages_of(
+            frames, registrar, sink, todo, options.overlays, workers if overlapped else 1
+        )
+        valid, made = sum(done.values()), 0
+        start = time.perf_counter()
         with (
             Progress(len(keys), len(done), quiet) as progress,
             contextlib.closing(
@@ -168,10 +171,13 @@ def stages_of(
     registrar: Registrar,
     sink: Sink,
     todo: Sequence[bool],
-    options: RegistrationOptions,
+    overlays: bool,
+    workers: int,
 ) -> list[Stage]:
-    """Decode, depth, warp, encode: from the index of a frame to the number of its valid pixels."""
-    workers = min(options.threads or len(os.sched_getaffinity(0)), WORKERS)
+    """Decode, depth, warp, encode: from the index of a frame to the number of its valid pixels.
+
+    Stages in which frames do not depend on each other have as many ``workers``.
+    """
 
     def many(parallel: bool) -> int:
         return workers if parallel else 1
@@ -187,7 +193,7 @@ def stages_of(
     def depth(frame: _Frame) -> _Frame:
         assert frame.reference is not None
         frame.depth = frames.depth(frame.index, frame.reference)
-        if not options.overlays:
+        if not overlays:
             frame.reference = None
         return frame
 
