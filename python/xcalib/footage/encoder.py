@@ -121,6 +121,8 @@ def join(
 ) -> None:
     """Write a video, whole or not at all, of the compressed frames of its parts.
 
+    Until it is whole it is with the parts.
+
     Parameters
     ----------
     parts
@@ -132,7 +134,7 @@ def join(
     check
         Called for every frame; what it raises ends the writing.
     """
-    partial = target.with_name(f".{target.stem}.{os.getpid()}.partial{target.suffix}")
+    partial = parts[0][0].with_name(f"{target.name}.partial")
     step = 1 / _fraction(rate)
     frames, described = 0, None
     try:

@@ -72,6 +72,10 @@ class FolderSink:
 
     def begin(self, keys: Sequence[str]) -> dict[str, int]:
         self._keys, wanted = keys, set(keys)
+        if self.journal.units:  # then it is ours alone: what is partial is of a killed run
+            for name in ("", "masks", "overlays"):
+                for file in (self.folder / name).glob(".*.partial"):
+                    file.unlink()
         found = [pair for unit in self.journal.units for pair in unit.frames.items()]
         return {key: valid for key, valid in found if key in wanted}
 
