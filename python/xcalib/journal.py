@@ -133,6 +133,8 @@ class Journal:
                 raise ValueError
             if any(Path(name).is_absolute() or ".." in name for u in units for name in u.files):
                 raise ValueError  # what --overwrite removes is ours
+            if not all(unit.frames and unit.files for unit in units):
+                raise ValueError
         except (ValueError, KeyError, TypeError):
             raise InputError(
                 f"{self.path}: not a journal of format {FORMAT}, version {VERSION}; expected"

@@ -79,7 +79,7 @@ class Encoder:
         self._frames = 0
         _, codec, stored, options = _KINDS[target.suffix.lower()]
         with _named(target):
-            self._container = av.open(str(self._partial), "w", format="matroska")
+            self._container = av.open(_name(self._partial), "w", format="matroska")
             stream = self._container.add_stream(codec, rate=_fraction(rate), options=options)
             assert isinstance(stream, av.VideoStream)
             self._stream = stream
@@ -138,10 +138,10 @@ def join(
     step = 1 / _fraction(rate)
     frames, described = 0, None
     try:
-        with _named(target), av.open(str(partial), "w", format=_format(target)) as container:
+        with _named(target), av.open(_name(partial), "w", format=_format(target)) as container:
             stream = None
             for path, count in parts:
-                with av.open(str(path)) as part:
+                with av.open(_name(path)) as part:
                     source = part.streams.video[0]
                     if stream is None:
                         stream = container.add_stream_from_template(source)
@@ -163,6 +163,11 @@ def join(
         partial.unlink(missing_ok=True)
 
 
+def _name(path: Path) -> str:
+    """A name that FFmpeg takes for a file: ``a:b.mkv`` alone would be of a protocol ``a``."""
+    return str(path.absolute())
+
+
 def _format(target: Path) -> str:
     return _KINDS[target.suffix.lower()][0]
 
@@ -178,7 +183,7 @@ def _packets(container: av.container.InputContainer, count: int) -> Iterator[av.
 def _check_count(path: Path, frames: int, target: Path) -> None:
     """Raise OSError if fewer frames arrived on the disk."""
     try:
-        with _named(target), av.open(str(path)) as container:
+        with _named(target), av.open(_name(path)) as container:
             found = sum(1 for _ in _packets(container, frames))
     except (OSError, ValueError) as error:
         raise OSError(f"{target}: could not be written: {error}") from None
