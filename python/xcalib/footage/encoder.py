@@ -77,15 +77,12 @@ class Encoder:
         self._like = (*first.shape, str(first.dtype))
         self._pixels = _PIXELS[str(first.dtype), first.ndim]
         self._frames = 0
-        _, codec, stored, options = _KINDS[target.suffix.lower()]
+        stored = _KINDS[target.suffix.lower()][2]
         with _named(target):
             self._container = av.open(_name(self._partial), "w", format="matroska")
-            stream = self._container.add_stream(codec, rate=_fraction(rate), options=options)
-            assert isinstance(stream, av.VideoStream)
-            self._stream = stream
+            self._stream = _added(self._container, target, rate)
             self._stream.width, self._stream.height = size_of(first)
             self._stream.pix_fmt = stored or _LOSSLESS[self._pixels]
-            self._stream.codec_context.thread_type = "SLICE"
 
     def write(self, image: Image) -> None:
         """Add a frame."""
@@ -136,7 +133,7 @@ def join(
     """
     partial = parts[0][0].with_name(f"{target.name}.partial")
     step = 1 / _fraction(rate)
-    frames, described = 0, None
+    frames = 0
     try:
         with _named(target), av.open(_name(partial), "w", format=_format(target)) as container:
             stream = None
@@ -144,11 +141,14 @@ def join(
                 with av.open(_name(path)) as part:
                     source = part.streams.video[0]
                     if stream is None:
-                        stream = container.add_stream_from_template(source)
-                        stream.time_base = step
-                        described = source.codec_context.extradata
-                    if source.codec_context.extradata != described:
-                        raise OSError(f"{path}: coded otherwise than the parts before it")
+                        # By its settings: a stream made after a template has no rate, which
+                        # readers then guess.
+                        stream = _added(container, target, rate)
+                        stream.width, stream.height = source.width, source.height
+                        stream.pix_fmt = source.pix_fmt
+                        container.start_encoding()
+                    if source.codec_context.extradata != stream.codec_context.extradata:
+                        raise OSError(f"{path}: coded otherwise than {target.name} would be now")
                     for packet in _packets(part, count):
                         check()
                         packet.stream = stream
@@ -166,6 +166,15 @@ def join(
 def _name(path: Path) -> str:
     """A name that FFmpeg takes for a file: ``a:b.mkv`` alone would be of a protocol ``a``."""
     return str(path.absolute())
+
+
+def _added(container: av.container.OutputContainer, target: Path, rate: float) -> av.VideoStream:
+    """A new stream of frames as the target holds them; size and pixels are still to be set."""
+    _, codec, _, options = _KINDS[target.suffix.lower()]
+    stream = container.add_stream(codec, rate=_fraction(rate), options=options)
+    assert isinstance(stream, av.VideoStream)
+    stream.codec_context.thread_type = "SLICE"
+    return stream
 
 
 def _format(target: Path) -> str:
