@@ -25,10 +25,10 @@ struct CellGrid {
     int count() const { return width * height; }
 };
 
-// A buffer's length: behind the cells stands one for points that fall in none, and one more that
-// may be read together with it.
+// A buffer's length: behind the cells stands one for points that fall in none, and more that may be
+// read together with the last ones.
 inline std::size_t cells_with_room(const CellGrid& grid) {
-    return static_cast<std::size_t>(grid.count()) + 2;
+    return static_cast<std::size_t>(grid.count()) + 64;
 }
 
 }  // namespace xcalib

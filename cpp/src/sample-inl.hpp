@@ -1,0 +1,347 @@
+// The source at the points of a vector of reference pixels.
+// Included once for each instruction set.
+#if defined(XCALIB_SAMPLE_INL_) == defined(HWY_TARGET_TOGGLE)
+#ifdef XCALIB_SAMPLE_INL_
+#undef XCALIB_SAMPLE_INL_
+#else
+#define XCALIB_SAMPLE_INL_
+#endif
+
+#include <algorithm>
+#include <cstring>
+
+#include "project-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace xcalib {
+namespace HWY_NAMESPACE {
+namespace {
+
+// -- The four pixels around a point --------------------------------------------------------------
+
+// 32 bits from each of the byte offsets.
+HWY_INLINE Int gather_words(const char* base, Int offsets) {
+#if XCALIB_X86_LANES
+    return hn::GatherOffset(IntTag(), reinterpret_cast<const std::int32_t*>(base), offsets);
+#else  // which others do one by one, and only where aligned
+    HWY_ALIGN std::int32_t at[kLanes], words[kLanes];
+    hn::Store(offsets, IntTag(), at);
+    for (int i = 0; i < kLanes; ++i) std::memcpy(words + i, base + at[i], 4);
+    return hn::Load(IntTag(), words);
+#endif
+}
+
+HWY_INLINE Float gather_floats(const char* base, Int offsets) {
+    return hn::BitCast(FloatTag(), gather_words(base, offsets));
+}
+
+template <int kByte>
+HWY_INLINE Float byte_of(Int words) {
+    return hn::ConvertTo(FloatTag(), hn::And(hn::ShiftRight<8 * kByte>(words), set(0xff)));
+}
+HWY_INLINE Float low_of(Int words) {
+    return hn::ConvertTo(FloatTag(), hn::And(words, set(0xffff)));
+}
+HWY_INLINE Float high_of(Int words) {
+    // Shifted as an unsigned number.
+    const hn::RebindToUnsigned<IntTag> du;
+    return hn::ConvertTo(FloatTag(),
+                         hn::BitCast(IntTag(), hn::ShiftRight<16>(hn::BitCast(du, words))));
+}
+
+struct Pair {
+    Float left, right;
+};
+
+// Horizontal neighbours of all channels, from the byte offset of the left one. What is read ends
+// with the right one, or, of single bytes, within `last`, the last offset that has four bytes.
+HWY_INLINE void gather_pairs(float, const char* base, Int offsets, Int, Pair (&out)[1]) {
+#if XCALIB_X86_LANES
+    // Eight bytes at once: half as many loads.
+    const FloatTag d;
+    const hn::RepartitionToWide<IntTag> wide;
+    const hn::Half<IntTag> half;
+    const auto* words = reinterpret_cast<const std::int64_t*>(base);
+    const auto low =
+        hn::GatherOffset(wide, words, hn::PromoteTo(wide, hn::LowerHalf(half, offsets)));
+    const auto high =
+        hn::GatherOffset(wide, words, hn::PromoteTo(wide, hn::UpperHalf(half, offsets)));
+    out[0] = {hn::ConcatEven(d, hn::BitCast(d, high), hn::BitCast(d, low)),
+              hn::ConcatOdd(d, hn::BitCast(d, high), hn::BitCast(d, low))};
+#else
+    out[0] = {gather_floats(base, offsets), gather_floats(base + 4, offsets)};
+#endif
+}
+HWY_INLINE void gather_pairs(float, const char* base, Int offsets, Int, Pair (&out)[3]) {
+    for (int c = 0; c < 3; ++c)
+        out[c] = {gather_floats(base + 4 * c, offsets), gather_floats(base + 4 * c + 12, offsets)};
+}
+HWY_INLINE void gather_pairs(std::uint16_t, const char* base, Int offsets, Int, Pair (&out)[1]) {
+    const Int both = gather_words(base, offsets);
+    out[0] = {low_of(both), high_of(both)};
+}
+HWY_INLINE void gather_pairs(std::uint16_t, const char* base, Int offsets, Int, Pair (&out)[3]) {
+    const Int bg = gather_words(base, offsets), rb = gather_words(base + 4, offsets);
+    const Int gr = gather_words(base + 8, offsets);
+    out[0] = {low_of(bg), high_of(rb)};
+    out[1] = {high_of(bg), low_of(gr)};
+    out[2] = {low_of(rb), high_of(gr)};
+}
+HWY_INLINE void gather_pairs(std::uint8_t, const char* base, Int offsets, Int last,
+                             Pair (&out)[1]) {
+    const hn::RebindToUnsigned<IntTag> du;
+    const Int from = hn::Min(offsets, last);
+    const Int bits = hn::ShiftLeft<3>(hn::Sub(offsets, from));
+    const auto words = hn::BitCast(du, gather_words(base, from));
+    const Int both = hn::BitCast(IntTag(), hn::Shr(words, hn::BitCast(du, bits)));
+    out[0] = {byte_of<0>(both), byte_of<1>(both)};
+}
+HWY_INLINE void gather_pairs(std::uint8_t, const char* base, Int offsets, Int, Pair (&out)[3]) {
+    const Int bgrb = gather_words(base, offsets), rbgr = gather_words(base + 2, offsets);
+    out[0] = {byte_of<0>(bgrb), byte_of<3>(bgrb)};
+    out[1] = {byte_of<1>(bgrb), byte_of<2>(rbgr)};
+    out[2] = {byte_of<2>(bgrb), byte_of<3>(rbgr)};
+}
+
+#if HWY_TARGET != HWY_SCALAR
+// The same from one stretch of a row, into which all points fall: neighbours in the reference are
+// neighbours in the source, save across a depth edge. A shuffle is far cheaper than a gather.
+// `index` is the left pixel's place in the stretch, from 0 to window<T>() - 1, a power of two less
+// one.
+template <class T>
+constexpr int window() {
+    return sizeof(T) == 1 ? 16 : kLanes;
+}
+HWY_INLINE Pair pair_in_window(const float* row, Int index) {
+    const FloatTag d;
+    const auto lanes = hn::IndicesFromVec(d, index);
+    return {hn::TableLookupLanes(hn::LoadU(d, row), lanes),
+            hn::TableLookupLanes(hn::LoadU(d, row + 1), lanes)};
+}
+HWY_INLINE Pair pair_in_window(const std::uint16_t* row, Int index) {
+    const IntTag d;
+    const Int left = hn::PromoteTo(d, hn::LoadU(ShortTag(), row));
+    const Int right = hn::PromoteTo(d, hn::LoadU(ShortTag(), row + 1));
+    const Int both =
+        hn::TableLookupLanes(hn::Or(left, hn::ShiftLeft<16>(right)), hn::IndicesFromVec(d, index));
+    return {low_of(both), high_of(both)};
+}
+HWY_INLINE Pair pair_in_window(const std::uint8_t* row, Int index) {
+    const hn::Repartition<std::uint8_t, IntTag> bytes;
+    const auto places = hn::BitCast(bytes, hn::Or(index, set(static_cast<int>(0x80808000))));
+    const auto in = [&](const std::uint8_t* from) HWY_ATTR {
+        const auto looked_up = hn::TableLookupBytesOr0(hn::LoadDup128(bytes, from), places);
+        return hn::ConvertTo(FloatTag(), hn::BitCast(IntTag(), looked_up));
+    };
+    return {in(row), in(row + 1)};
+}
+#endif
+
+HWY_INLINE Float between(const Pair& top, const Pair& bottom, Float a, Float b) {
+    const Float upper = hn::MulAdd(a, hn::Sub(top.right, top.left), top.left);
+    const Float lower = hn::MulAdd(a, hn::Sub(bottom.right, bottom.left), bottom.left);
+    return hn::MulAdd(b, hn::Sub(lower, upper), upper);
+}
+
+// -- A row of the registered image ---------------------------------------------------------------
+
+HWY_INLINE void store(Float value, float* out) { hn::StoreU(value, FloatTag(), out); }
+template <class T>
+HWY_INLINE void store(Float value, T* out) {  // a mean of values in range is in range
+    const hn::Rebind<T, FloatTag> d;
+    hn::StoreU(hn::DemoteTo(d, to_integer(value)), d, out);  // which rounds
+}
+
+HWY_INLINE void store_pixels(const Float (&values)[1], float* out) { store(values[0], out); }
+template <class T>
+HWY_INLINE void store_pixels(const Float (&values)[1], T* out) {
+    store(values[0], out);
+}
+template <class T>
+HWY_INLINE void store_pixels(const Float (&values)[3], T* out) {
+    HWY_ALIGN T planes[3][kLanes];
+    for (int c = 0; c < 3; ++c) store(values[c], planes[c]);
+    const hn::Rebind<T, FloatTag> d;
+    hn::StoreInterleaved3(hn::Load(d, planes[0]), hn::Load(d, planes[1]), hn::Load(d, planes[2]), d,
+                          out);
+}
+
+struct Source {
+    const char* data;
+    std::ptrdiff_t row_bytes;
+    int width, height;
+    int last;  // byte offset of the last four bytes
+
+    HWY_INLINE explicit Source(const ImageView& view)
+        : data(static_cast<const char*>(view.data)), row_bytes(view.row_bytes), width(view.width),
+          height(view.height) {
+        const std::ptrdiff_t last_row = std::max<std::ptrdiff_t>(0, (height - 1) * row_bytes);
+        last = static_cast<int>(last_row) + width - 4;
+    }
+    template <class T>
+    HWY_INLINE const T* at(int x, int y) const {
+        return reinterpret_cast<const T*>(data + y * row_bytes) + x;
+    }
+};
+
+// The nearness of cells, `count` being one too.
+HWY_INLINE Float nearness_of([[maybe_unused]] const CellGrid& grid, const Nearness* cells,
+                             Int cell) {
+    const FloatTag d;
+    const auto* bytes = reinterpret_cast<const char*>(cells);
+#if HWY_TARGET != HWY_SCALAR
+    // Mostly the cells of a vector are close to each other: they are looked up in one piece.
+    const IntTag di;
+    constexpr int kWindow = 2 * kLanes, kBefore = kWindow / 8;
+    const int first = std::clamp(hn::GetLane(cell) - kBefore, 0, grid.count());
+    const Int index = hn::Sub(cell, set(first));
+    if (hn::AllTrue(di, hn::Eq(hn::AndNot(set(kWindow - 1), index), hn::Zero(di)))) {
+        const Int both = hn::TableLookupLanes(
+            hn::LoadU(di, reinterpret_cast<const std::int32_t*>(cells + first)),
+            hn::IndicesFromVec(di, hn::ShiftRight<1>(index)));
+        const Mask second = hn::RebindMask(d, hn::TestBit(index, set(1)));
+        return hn::BitCast(d, hn::IfThenElse(hn::RebindMask(di, second),
+                                             hn::And(both, set(static_cast<int>(0xffff0000))),
+                                             hn::ShiftLeft<16>(both)));
+    }
+#endif
+    return hn::BitCast(d, hn::ShiftLeft<16>(gather_words(bytes, hn::ShiftLeft<1>(cell))));
+}
+
+// Those that something nearer hides, of points within the source; anything of others.
+HWY_INLINE Mask hidden(const CellGrid& grid, const Nearness* cells, const Points& p) {
+    const hn::RebindToUnsigned<IntTag> du;
+    const Int cell =
+        cells_of(grid, hn::Mul(p.u, set(grid.per_pixel_x)), hn::Mul(p.v, set(grid.per_pixel_y)));
+    const Int there = hn::BitCast(
+        IntTag(),
+        hn::Min(hn::BitCast(du, cell), hn::Set(du, static_cast<std::uint32_t>(grid.count()))));
+    const Float nearest = nearness_of(grid, cells, there);
+    const Float bound =
+        hn::MulAdd(p.inverse_z, set(1.0f + grid.relative_tolerance), set(grid.absolute_tolerance));
+    return hn::Gt(nearest, bound);
+}
+
+HWY_INLINE Int code_of(Validity code) { return set(static_cast<int>(code)); }
+HWY_INLINE void store_codes(Int codes, std::uint8_t* mask) {
+    hn::StoreU(hn::DemoteTo(ByteTag(), codes), ByteTag(), mask);
+}
+
+// Points between the pixels `x` and `y` of their upper left, by (a, b); 0 where not valid. The last
+// cell serves its far edge too, so that all four pixels exist.
+struct Places {
+    Int x, y;
+    Float a, b;
+
+    HWY_INLINE Places(const Source& source, const Located& at, Mask valid) {
+        const Float zero = hn::Zero(FloatTag()), one = set(1.0);
+        const auto within = [&](Float whole, int size) HWY_ATTR {
+            return hn::IfThenElseZero(valid, hn::Min(hn::Max(whole, zero), set(size - 2.0)));
+        };
+        const auto part = [&](Float part, Float moved) HWY_ATTR {
+            return hn::IfThenElseZero(valid, hn::Min(hn::Max(hn::Add(part, moved), zero), one));
+        };
+        const Float left = within(at.left(), source.width), top = within(at.top(), source.height);
+        x = to_integer(left);
+        y = to_integer(top);
+        a = part(at.a, hn::Sub(at.left(), left));
+        b = part(at.b, hn::Sub(at.top(), top));
+    }
+};
+
+template <class T, int kChannels>
+HWY_INLINE void interpolate_anywhere(const Source& source, const Places& p,
+                                     Float (&values)[kChannels]) {
+    const Int stride = set(static_cast<int>(source.row_bytes));
+    const Int offsets =
+        hn::Add(hn::Mul(p.y, stride), hn::Mul(p.x, set(kChannels * int{sizeof(T)})));
+    const Int last = set(source.last);
+    Pair top[kChannels], bottom[kChannels];
+    gather_pairs(T(), source.data, offsets, last, top);
+    gather_pairs(T(), source.data, hn::Add(offsets, stride), last, bottom);
+    for (int c = 0; c < kChannels; ++c) values[c] = between(top[c], bottom[c], p.a, p.b);
+}
+
+#if HWY_TARGET != HWY_SCALAR
+// The first column of a window with pixel `first`, of a source that is wider than it. Left of that
+// pixel may be some others.
+template <class T>
+HWY_INLINE int window_from(const Source& source, int first) {
+    constexpr int kBefore = window<T>() / 8;
+    return std::clamp(first, kBefore, source.width - 1 - window<T>() + kBefore) - kBefore;
+}
+
+template <class T>
+HWY_INLINE Float interpolate_in_window(const Source& source, int from, int row, Int index, Float a,
+                                       Float b) {
+    return between(pair_in_window(source.at<T>(from, row), index),
+                   pair_in_window(source.at<T>(from, row + 1), index), a, b);
+}
+
+// At a depth edge, or where the points come into the next row, few windows hold all of them.
+template <class T>
+HWY_INLINE void interpolate_in_windows(const Source& source, const Places& p, Mask valid,
+                                       Float (&values)[1]) {
+    const FloatTag d;
+    const IntTag di;
+    constexpr int kMost = 4;  // more take longer than to gather
+    values[0] = hn::Zero(d);
+    HWY_ALIGN std::int32_t x[kLanes], y[kLanes];
+    hn::Store(p.x, di, x);
+    hn::Store(p.y, di, y);
+    Mask left = valid;
+    for (int i = 0; i < kMost; ++i) {
+        const auto first = hn::FindFirstTrue(d, left);
+        if (first < 0) return;
+        const int from = window_from<T>(source, x[first]), row = y[first];
+        const Int index = hn::Sub(p.x, set(from));
+        const Int apart = hn::Or(hn::Xor(p.y, set(row)), hn::AndNot(set(window<T>() - 1), index));
+        const Mask here = hn::And(left, hn::RebindMask(d, hn::Eq(apart, hn::Zero(di))));
+        values[0] = hn::IfThenElse(
+            here, interpolate_in_window<T>(source, from, row, index, p.a, p.b), values[0]);
+        left = hn::AndNot(here, left);
+    }
+    if (hn::AllFalse(d, left)) return;
+    Float gathered[1];
+    interpolate_anywhere<T>(source, p, gathered);
+    values[0] = hn::IfThenElse(left, gathered[0], values[0]);
+}
+#endif
+
+template <class T, int kChannels>
+HWY_INLINE void sample_bilinear(const Source& source, const Located& at, Mask valid, T* out) {
+    const Places places(source, at, valid);
+    Float values[kChannels];
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (kChannels == 1) {
+        if (source.width > window<T>()) interpolate_in_windows<T>(source, places, valid, values);
+        else interpolate_anywhere<T>(source, places, values);
+    } else {
+        interpolate_anywhere<T>(source, places, values);
+    }
+#else
+    interpolate_anywhere<T>(source, places, values);
+#endif
+    for (Float& value : values) value = hn::IfThenElseZero(valid, value);
+    store_pixels(values, out);
+}
+
+// The pixel whose centre is next, as it is, so that counts of a radiometric source are never mixed.
+template <class T, int kChannels>
+HWY_INLINE void sample_nearest(const Source& source, const Points& p, Mask valid, T* out) {
+    const IntTag di;
+    HWY_ALIGN std::int32_t x[kLanes], y[kLanes], ok[kLanes];
+    hn::Store(to_integer(p.u), di, x);
+    hn::Store(to_integer(p.v), di, y);
+    hn::Store(hn::VecFromMask(di, hn::RebindMask(di, valid)), di, ok);
+    for (int i = 0; i < kLanes; ++i)
+        for (int c = 0; c < kChannels; ++c)
+            out[kChannels * i + c] = ok[i] ? source.at<T>(kChannels * x[i] + c, y[i])[0] : T{0};
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace xcalib
+HWY_AFTER_NAMESPACE();
+
+#endif
