@@ -29,6 +29,9 @@ CellGrid::CellGrid(const Rig& rig) {
     per_pixel_x = static_cast<float>(x);
     per_pixel_y = static_cast<float>(y);
     relative_tolerance = static_cast<float>(kRelativeTolerance);
+    const double moved_x = x * rig.source.fx * std::abs(rig.t().x());
+    const double moved_y = y * rig.source.fy * std::abs(rig.t().y());
+    along_x = moved_x >= moved_y;
     absolute_tolerance = static_cast<float>(
         kLeastShift / (std::max(x * rig.source.fx, y * rig.source.fy) * rig.t().norm()));
 }

@@ -19,16 +19,19 @@ struct CellGrid {
     // Hidden is what has a 1/z below that of its cell by more than
     // relative_tolerance / z + absolute_tolerance [1/m].
     float relative_tolerance = 0, absolute_tolerance = 0;
+    // What is near hides half a cell to both sides, along the axis on which points move most.
+    bool along_x = true;
 
     CellGrid() = default;
     explicit CellGrid(const Rig& rig);
     int count() const { return width * height; }
+    int step() const { return along_x ? 1 : width; }  // to the next cell on that axis
 };
 
 // A buffer's length: behind the cells stands one for points that fall in none, and more that may be
 // read together with the last ones.
 inline std::size_t cells_with_room(const CellGrid& grid) {
-    return static_cast<std::size_t>(grid.count()) + 64;
+    return static_cast<std::size_t>(grid.count()) + grid.width + 64;
 }
 
 }  // namespace xcalib

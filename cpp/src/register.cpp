@@ -1,6 +1,7 @@
 #include "xcalib/register.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -19,6 +20,8 @@ namespace {
 constexpr int kMostParts = 8;
 // Rows that a thread takes at a time, so that one that is held up keeps no other waiting.
 constexpr int kRows = 32;
+// The kernel's floats count whole pixels up to here.
+constexpr int kMostSourcePixels = 4000000;
 
 void require_size(const char* name, int width, int height, const Pinhole& camera) {
     if (width == camera.width && height == camera.height) return;
@@ -93,28 +96,28 @@ struct Registrar::Stream {
         std::unique_ptr<Cells> cells;
         const Nearness* joined = nullptr;
         const int height = depth.view.height;
-        const auto share = [](int of, int part, int count) {
-            return static_cast<int>(static_cast<long>(of) * part / count);
+        const auto in_rows = [&](int rows, const auto& work_on) {
+            workers.each((rows + kRows - 1) / kRows, [&](int part) {
+                work_on(part * kRows, std::min(rows, (part + 1) * kRows));
+            });
         };
         if (occlusion && asked) {
             cells = take();
             const std::size_t size = cells_with_room(grid);
+            std::atomic<int> next{0};
             workers.each(parts, [&](int part) {
                 Nearness* own = cells->data() + part * size;
                 std::fill_n(own, size, Nearness{0});
-                splat_rows(reprojection, depth, grid, share(height, part, parts),
-                           share(height, part + 1, parts), own);
+                for (int y = next.fetch_add(kRows); y < height; y = next.fetch_add(kRows))
+                    splat_rows(reprojection, depth, grid, y, std::min(height, y + kRows), own);
             });
             Nearness* out = cells->data() + parts * size;
-            workers.each(parts, [&](int part) {
-                join_cells(grid, cells->data(), parts, share(grid.height, part, parts),
-                           share(grid.height, part + 1, parts), out);
+            in_rows(grid.height, [&](int begin, int end) {
+                join_cells(grid, cells->data(), parts, begin, end, out);
             });
             joined = out;
         }
-        workers.each((height + kRows - 1) / kRows, [&](int part) {
-            work(joined, part * kRows, std::min(height, (part + 1) * kRows));
-        });
+        in_rows(height, [&](int begin, int end) { work(joined, begin, end); });
         if (cells) give_back(std::move(cells));
     }
 };
@@ -123,6 +126,12 @@ Registrar::Registrar(const Rig& rig, const RegistrarOptions& options)
     : rig_((rig.validate(), rig)), options_((options.validate(), options)), reprojection_(rig) {
     if (rig.source.width < 2 || rig.source.height < 2)
         throw std::invalid_argument("source is narrower than 2 px, too small to interpolate");
+    if (std::max(rig.source.width, rig.source.height) > kMostSourcePixels) {
+        std::ostringstream message;
+        message << "source is " << rig.source.width << "x" << rig.source.height
+                << ", expected at most " << kMostSourcePixels << " px a side";
+        throw std::invalid_argument(message.str());
+    }
     stream_ = std::make_unique<Stream>(rig, options);
 }
 

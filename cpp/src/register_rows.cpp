@@ -44,16 +44,17 @@ HWY_INLINE void sample(const RowsTask& task, const Source& source, const Row& ro
 // A stretch of a row of one channel: what is usual is done in loops of a few steps each, through
 // memory. A vector's steps wait for each other, and what waits fills the processor; in short loops,
 // other vectors' steps come in between.
-using Vectors = std::uint64_t;  // one bit for each
-constexpr int kVectors = 64;
+using Vectors = std::uint32_t;  // one bit for each
+constexpr int kVectors = 16;
 
-struct Stretch {
-    // Of the pixel left of and above the point, shifted by kLarge, and how far it is from there.
-    HWY_ALIGN float x[kVectors * kLanes], y[kVectors * kLanes];
-    HWY_ALIGN float a[kVectors * kLanes], b[kVectors * kLanes];
-    HWY_ALIGN float inverse_z[kVectors * kLanes];
-    int from[kVectors], upper[kVectors];  // each vector's window
+struct UsualVector {
+    // As in Located, and in Cells.
+    HWY_ALIGN float x[kLanes], y[kLanes], a[kLanes], b[kLanes];
+    HWY_ALIGN float cell_x[kLanes], cell_y[kLanes], inverse_z[kLanes];
+    int from, upper;  // its window of the source
+    int first_cell;
 };
+using Stretch = UsualVector[kVectors];
 
 // That which is far outside may overflow.
 HWY_INLINE int whole_of(float shifted) {
@@ -64,39 +65,65 @@ HWY_INLINE int whole_of(float shifted) {
 
 // Where `count` vectors lie, from pixel `begin` of row y on.
 HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& depths, int y,
-                       int begin, int count, Stretch& stretch) {
+                       int begin, int count, const char* out, int vector_bytes, Stretch& stretch) {
     const FloatTag d;
     const Float least = hn::Set(d, least_depth(*task.reprojection, y, task.depth.view.width));
     Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
-    for (int i = 0; i < count * kLanes; i += kLanes) {
-        const Float depth = depths.load(begin + i);
-        depths.prefetch_next_row(begin + i);
+    for (int i = 0; i < count; ++i) {
+        UsualVector& vector = stretch[i];
+        const int x = begin + i * kLanes;
+        const Float depth = depths.load(x);
+        depths.prefetch_next_row(x);
+        __builtin_prefetch(out + i * vector_bytes, 1);  // to be written
         const Located at = locate(row, depth, along);
         // Elsewhere it is far outside.
-        hn::Store(hn::IfThenElseZero(hn::Gt(depth, least), at.x), d, stretch.x + i);
-        hn::Store(at.y, d, stretch.y + i);
-        hn::Store(at.a, d, stretch.a + i);
-        hn::Store(at.b, d, stretch.b + i);
-        if (task.cells) hn::Store(at.inverse_z, d, stretch.inverse_z + i);
+        hn::Store(hn::IfThenElseZero(hn::Gt(depth, least), at.x), d, vector.x);
+        hn::Store(at.y, d, vector.y);
+        hn::Store(at.a, d, vector.a);
+        hn::Store(at.b, d, vector.b);
+        if (task.cells) {
+            const Cells cells(*task.grid, at.points());
+            hn::Store(cells.x, d, vector.cell_x);
+            hn::Store(cells.y, d, vector.cell_y);
+            hn::Store(at.inverse_z, d, vector.inverse_z);
+        }
         along = hn::Add(along, set(double{kLanes}));
     }
 }
 
-// The vectors of which a point is hidden.
-HWY_INLINE Vectors find_hidden(const RowsTask& task, int count, const Stretch& stretch) {
+// The vectors of which a point is hidden, or may be.
+HWY_INLINE Vectors find_hidden(const RowsTask& task, int count, Stretch& stretch) {
     const FloatTag d;
-    Vectors hidden_ones = 0;
+    const IntTag di;
+    const hn::Repartition<Nearness, IntTag> pairs;
+    const CellGrid& grid = *task.grid;
+    constexpr int kWindow = 2 * kLanes, kBefore = kWindow / 8;
+    for (int i = 0; i < count; ++i)
+        stretch[i].first_cell =
+            std::clamp(whole_of(stretch[i].cell_x[0]), kBefore, grid.width) - kBefore;
+    Vectors found = 0;
     for (int i = 0; i < count; ++i) {
-        const int k = i * kLanes;
-        const Located at{hn::Load(d, stretch.x + k),
-                         hn::Load(d, stretch.y + k),
-                         hn::Load(d, stretch.a + k),
-                         hn::Load(d, stretch.b + k),
-                         hn::Zero(d),
-                         hn::Load(d, stretch.inverse_z + k)};
-        hidden_ones |= Vectors{!hn::AllFalse(d, hidden(*task.grid, task.cells, at.points()))} << i;
+        const UsualVector& vector = stretch[i];
+        const int first = vector.first_cell;
+        const int row = std::clamp(whole_of(vector.cell_y[0]), 0, grid.height - 1);
+        const Int x = hn::BitCast(di, hn::Load(d, vector.cell_x));
+        const Int y = hn::BitCast(di, hn::Load(d, vector.cell_y));
+        const Int index = hn::Sub(x, set(first + kLargeBits));
+        const Int apart =
+            hn::Or(hn::Xor(y, set(row + kLargeBits)), hn::AndNot(set(kWindow - 1), index));
+        const Nearness* from = task.cells + row * grid.width + first;
+        const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + grid.step()));
+        const Int both = hn::TableLookupLanes(
+            hn::BitCast(di, nearest),
+            hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
+        const Int chosen = hn::IfThenElse(hn::TestBit(index, set(1)),
+                                          hn::And(both, set(static_cast<int>(0xffff0000))),
+                                          hn::ShiftLeft<16>(both));
+        const Mask behind = is_behind(grid, hn::BitCast(d, chosen), hn::Load(d, vector.inverse_z));
+        const Mask elsewhere = hn::RebindMask(d, hn::Ne(apart, hn::Zero(di)));
+        found |= Vectors{!hn::AllFalse(d, hn::Or(behind, elsewhere))} << i;
     }
-    return hidden_ones;
+    return found;
 }
 
 // Samples the vectors of which all points lie between the same two rows of the source, and within a
@@ -108,20 +135,21 @@ HWY_INLINE Vectors sample_windows(const Source& source, int count, Stretch& stre
     const FloatTag d;
     const IntTag di;
     for (int i = 0; i < count; ++i) {  // within the source, whatever the points are
-        stretch.from[i] = window_from<T>(source, whole_of(stretch.x[i * kLanes]));
-        stretch.upper[i] = std::clamp(whole_of(stretch.y[i * kLanes]), 0, source.height - 2);
+        stretch[i].from = window_from<T>(source, whole_of(stretch[i].x[0]));
+        stretch[i].upper = std::clamp(whole_of(stretch[i].y[0]), 0, source.height - 2);
     }
     Vectors others = 0;
     for (int i = 0; i < count; ++i) {
-        const int k = i * kLanes, from = stretch.from[i], upper = stretch.upper[i];
-        const Int x = hn::BitCast(di, hn::Load(d, stretch.x + k));
-        const Int y = hn::BitCast(di, hn::Load(d, stretch.y + k));
+        const UsualVector& vector = stretch[i];
+        const int k = i * kLanes, from = vector.from, upper = vector.upper;
+        const Int x = hn::BitCast(di, hn::Load(d, vector.x));
+        const Int y = hn::BitCast(di, hn::Load(d, vector.y));
         const Int index = hn::Sub(x, set(from + kLargeBits));
         const Int apart =
             hn::Or(hn::Xor(y, set(upper + kLargeBits)), hn::AndNot(set(window<T>() - 1), index));
         others |= Vectors{!hn::AllTrue(di, hn::Eq(apart, hn::Zero(di)))} << i;
-        store(interpolate_in_window<T>(source, from, upper, index, hn::Load(d, stretch.a + k),
-                                       hn::Load(d, stretch.b + k)),
+        store(interpolate_in_window<T>(source, from, upper, index, hn::Load(d, vector.a),
+                                       hn::Load(d, vector.b)),
               out + k);
         hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + k);
     }
@@ -162,12 +190,13 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
             const bool windows = !task.nearest && source.width > window<T>();
             while (windows && width - x >= kLanes) {
                 const int count = std::min(kVectors, (width - x) / kLanes);
-                locate(task, row, depth, y, x, count, stretch);
+                locate(task, row, depth, y, x, count, reinterpret_cast<const char*>(out + x),
+                       int{sizeof(T)} * kLanes, stretch);
                 Vectors left = sample_windows(source, count, stretch, out + x, mask + x);
                 if (task.cells) left |= find_hidden(task, count, stretch);
                 for (; left; left &= left - 1)
                     sample_at(x +
-                              kLanes * static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero64(left)));
+                              kLanes * static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left)));
                 x += count * kLanes;
             }
         }

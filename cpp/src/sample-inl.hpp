@@ -107,14 +107,14 @@ HWY_INLINE void gather_pairs(std::uint8_t, const char* base, Int offsets, Int, P
 // The same from one stretch of a row, into which all points fall: neighbours in the reference are
 // neighbours in the source, save across a depth edge. A shuffle is far cheaper than a gather.
 // `index` is the left pixel's place in the stretch, from 0 to window<T>() - 1, a power of two less
-// one.
+// one; of what lies elsewhere something comes out, which does not count.
 template <class T>
 constexpr int window() {
     return sizeof(T) == 1 ? 16 : kLanes;
 }
 HWY_INLINE Pair pair_in_window(const float* row, Int index) {
     const FloatTag d;
-    const auto lanes = hn::IndicesFromVec(d, index);
+    const auto lanes = hn::IndicesFromVec(d, hn::And(index, set(kLanes - 1)));
     return {hn::TableLookupLanes(hn::LoadU(d, row), lanes),
             hn::TableLookupLanes(hn::LoadU(d, row + 1), lanes)};
 }
@@ -122,8 +122,8 @@ HWY_INLINE Pair pair_in_window(const std::uint16_t* row, Int index) {
     const IntTag d;
     const Int left = hn::PromoteTo(d, hn::LoadU(ShortTag(), row));
     const Int right = hn::PromoteTo(d, hn::LoadU(ShortTag(), row + 1));
-    const Int both =
-        hn::TableLookupLanes(hn::Or(left, hn::ShiftLeft<16>(right)), hn::IndicesFromVec(d, index));
+    const Int both = hn::TableLookupLanes(hn::Or(left, hn::ShiftLeft<16>(right)),
+                                          hn::IndicesFromVec(d, hn::And(index, set(kLanes - 1))));
     return {low_of(both), high_of(both)};
 }
 HWY_INLINE Pair pair_in_window(const std::uint8_t* row, Int index) {
@@ -184,42 +184,45 @@ struct Source {
     }
 };
 
-// The nearness of cells, `count` being one too.
-HWY_INLINE Float nearness_of([[maybe_unused]] const CellGrid& grid, const Nearness* cells,
-                             Int cell) {
-    const FloatTag d;
-    const auto* bytes = reinterpret_cast<const char*>(cells);
-#if HWY_TARGET != HWY_SCALAR
-    // Mostly the cells of a vector are close to each other: they are looked up in one piece.
-    const IntTag di;
-    constexpr int kWindow = 2 * kLanes, kBefore = kWindow / 8;
-    const int first = std::clamp(hn::GetLane(cell) - kBefore, 0, grid.count());
-    const Int index = hn::Sub(cell, set(first));
-    if (hn::AllTrue(di, hn::Eq(hn::AndNot(set(kWindow - 1), index), hn::Zero(di)))) {
-        const Int both = hn::TableLookupLanes(
-            hn::LoadU(di, reinterpret_cast<const std::int32_t*>(cells + first)),
-            hn::IndicesFromVec(di, hn::ShiftRight<1>(index)));
-        const Mask second = hn::RebindMask(d, hn::TestBit(index, set(1)));
-        return hn::BitCast(d, hn::IfThenElse(hn::RebindMask(di, second),
-                                             hn::And(both, set(static_cast<int>(0xffff0000))),
-                                             hn::ShiftLeft<16>(both)));
+// -- What hides a point ---------------------------------------------------------------------------
+
+// Of the two cells that a point lies between, or on its row or column in, the upper left, shifted
+// by kLarge. A silhouette lies anywhere between the last pixel on it and the first beside it: half
+// a cell to both sides, along the way that near points move, is searched.
+struct Cells {
+    Float x, y;
+
+    HWY_INLINE Cells(const CellGrid& grid, const Points& p) {
+        const auto below = [](Float pixels, float per_pixel, double reach) HWY_ATTR {
+            const Float in_cells = hn::MulAdd(pixels, set(per_pixel), set(-0.5 - reach));
+            return hn::Add(hn::Max(in_cells, hn::Zero(FloatTag())), set(kLarge));
+        };
+        x = below(p.u, grid.per_pixel_x, grid.along_x ? 0.5 : 0.0);
+        y = below(p.v, grid.per_pixel_y, grid.along_x ? 0.0 : 0.5);
     }
-#endif
-    return hn::BitCast(d, hn::ShiftLeft<16>(gather_words(bytes, hn::ShiftLeft<1>(cell))));
+};
+
+HWY_INLINE Mask is_behind(const CellGrid& grid, Float nearest, Float inverse_z) {
+    const Float bound =
+        hn::MulAdd(inverse_z, set(1.0f + grid.relative_tolerance), set(grid.absolute_tolerance));
+    return hn::Gt(nearest, bound);
 }
 
 // Those that something nearer hides, of points within the source; anything of others.
 HWY_INLINE Mask hidden(const CellGrid& grid, const Nearness* cells, const Points& p) {
+    const FloatTag d;
     const hn::RebindToUnsigned<IntTag> du;
-    const Int cell =
-        cells_of(grid, hn::Mul(p.u, set(grid.per_pixel_x)), hn::Mul(p.v, set(grid.per_pixel_y)));
-    const Int there = hn::BitCast(
-        IntTag(),
-        hn::Min(hn::BitCast(du, cell), hn::Set(du, static_cast<std::uint32_t>(grid.count()))));
-    const Float nearest = nearness_of(grid, cells, there);
-    const Float bound =
-        hn::MulAdd(p.inverse_z, set(1.0f + grid.relative_tolerance), set(grid.absolute_tolerance));
-    return hn::Gt(nearest, bound);
+    const Cells at(grid, p);
+    const Float cell = hn::MulAdd(hn::Sub(at.y, set(kLarge)), set(static_cast<double>(grid.width)),
+                                  hn::Sub(at.x, set(kLarge)));
+    const auto last = hn::Set(du, static_cast<std::uint32_t>(grid.count()));
+    const Int there = hn::BitCast(IntTag(), hn::Min(hn::BitCast(du, to_integer(cell)), last));
+    const auto nearness_at = [&](const Nearness* from) HWY_ATTR {
+        const auto* bytes = reinterpret_cast<const char*>(from);
+        return hn::BitCast(d, hn::ShiftLeft<16>(gather_words(bytes, hn::ShiftLeft<1>(there))));
+    };
+    return is_behind(grid, hn::Max(nearness_at(cells), nearness_at(cells + grid.step())),
+                     p.inverse_z);
 }
 
 HWY_INLINE Int code_of(Validity code) { return set(static_cast<int>(code)); }
