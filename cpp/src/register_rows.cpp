@@ -91,8 +91,10 @@ HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& dep
     }
 }
 
-// The vectors of which a point is hidden, or may be.
-HWY_INLINE Vectors find_hidden(const RowsTask& task, int count, Stretch& stretch) {
+// Marks what is hidden. Returns the vectors of which not all cells are close to each other, and
+// those that hold something to be 0.
+HWY_INLINE Vectors mark_hidden(const RowsTask& task, int count, Stretch& stretch,
+                               std::uint8_t* mask) {
     const FloatTag d;
     const IntTag di;
     const hn::Repartition<Nearness, IntTag> pairs;
@@ -101,7 +103,7 @@ HWY_INLINE Vectors find_hidden(const RowsTask& task, int count, Stretch& stretch
     for (int i = 0; i < count; ++i)
         stretch[i].first_cell =
             std::clamp(whole_of(stretch[i].cell_x[0]), kBefore, grid.width) - kBefore;
-    Vectors found = 0;
+    Vectors others = 0;
     for (int i = 0; i < count; ++i) {
         const UsualVector& vector = stretch[i];
         const int first = vector.first_cell;
@@ -121,9 +123,14 @@ HWY_INLINE Vectors find_hidden(const RowsTask& task, int count, Stretch& stretch
                                           hn::ShiftLeft<16>(both));
         const Mask behind = is_behind(grid, hn::BitCast(d, chosen), hn::Load(d, vector.inverse_z));
         const Mask elsewhere = hn::RebindMask(d, hn::Ne(apart, hn::Zero(di)));
-        found |= Vectors{!hn::AllFalse(d, hn::Or(behind, elsewhere))} << i;
+        others |= Vectors{!hn::AllFalse(d, elsewhere)} << i;
+        if (hn::AllFalse(d, behind)) continue;
+        others |= Vectors{task.hide} << i;
+        const Mask gone = hn::AndNot(elsewhere, behind);
+        store_codes(hn::IfThenElseZero(hn::RebindMask(di, gone), code_of(Validity::occluded)),
+                    mask + i * kLanes);
     }
-    return found;
+    return others;
 }
 
 // Samples the vectors of which all points lie between the same two rows of the source, and within a
@@ -193,7 +200,7 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
                 locate(task, row, depth, y, x, count, reinterpret_cast<const char*>(out + x),
                        int{sizeof(T)} * kLanes, stretch);
                 Vectors left = sample_windows(source, count, stretch, out + x, mask + x);
-                if (task.cells) left |= find_hidden(task, count, stretch);
+                if (task.cells) left |= mark_hidden(task, count, stretch, mask + x);
                 for (; left; left &= left - 1)
                     sample_at(x +
                               kLanes * static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left)));

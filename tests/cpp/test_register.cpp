@@ -145,6 +145,16 @@ TEST(Registrar, Keeps16BitInColour) { expect_registered_as_by_the_book<std::uint
 TEST(Registrar, KeepsFloatsInOneChannel) { expect_registered_as_by_the_book<float>(1); }
 TEST(Registrar, KeepsFloatsInColour) { expect_registered_as_by_the_book<float>(3); }
 
+TEST(Registrar, RefusesASourceOfMorePixelsASideThanItCounts) {
+    Rig rig = small_rig(1);
+    rig.source.width = 4000001;
+    EXPECT_NE(
+        refusal([&] { Registrar{rig}; }).find("source is 4000001x40, expected at most 4000000"),
+        std::string::npos);
+    rig.source.width = 4000000;
+    EXPECT_EQ(refusal([&] { Registrar(rig, by(1)); }), "");
+}
+
 // A rig that moves by an exact part of a pixel, so that the interpolant is known by hand.
 Rig shifted_rig(int width, int height, double dx, double dy) {
     Rig rig{Pinhole::from_hfov(width, height, 1.0), Pinhole::from_hfov(width, height, 1.0), {}};
