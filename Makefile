@@ -15,13 +15,14 @@ WERROR := $(if $(CI),ON,OFF)
 BUILD_PACKAGES := cmake g++ libceres-dev libeigen3-dev libhwy-dev libopencv-dev libyaml-cpp-dev make \
     ninja-build python3-dev python3-venv
 TEST_PACKAGES := clang-format libgtest-dev
+BENCH_PACKAGES := libbenchmark-dev
 
-CPP_FILES = $(shell find cpp tests/cpp -name '*.cpp' -o -name '*.hpp')
+CPP_FILES = $(shell find bench/cpp cpp tests/cpp -name '*.cpp' -o -name '*.hpp')
 # What the wheel is made of: it is built again when one of these changes.
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
     $(shell find cpp python -type f -not -path '*/__pycache__/*')
 
-.PHONY: help demo test lint test-cpp test-sdist test-python sanitize format stub bench clean
+.PHONY: help demo test lint test-cpp test-sdist test-python sanitize format stub clean
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
 
@@ -32,11 +33,13 @@ test: lint test-cpp test-sdist test-python ## every check and test, C++ and Pyth
 
 # -- What the machine needs -----------------------------------------------------------------------
 
-.PHONY: build-packages test-packages
+.PHONY: build-packages test-packages bench-packages
 build-packages:
 	@scripts/install_packages.sh $(BUILD_PACKAGES)
 test-packages: | build-packages
 	@scripts/install_packages.sh $(TEST_PACKAGES)
+bench-packages: | build-packages
+	@scripts/install_packages.sh $(BENCH_PACKAGES)
 
 # -- The environment, and the package in it -------------------------------------------------------
 
@@ -57,6 +60,12 @@ $(VENV)/.build-requires: pyproject.toml $(VENV)/.created
 $(VENV)/.test-requires: pyproject.toml $(VENV)/.build-requires
 	@echo "installing what the tests require"
 	@$(PIP) install -q -r <($(call requirements,project optional-dependencies test))
+	touch $@
+
+# PyTorch is the largest of them: of its builds, the one that PIP_EXTRA_INDEX_URL and the like choose.
+$(VENV)/.bench-requires: pyproject.toml $(VENV)/.build-requires
+	@echo "installing what the benchmarks require"
+	@$(PIP) install -q -r <($(call requirements,project optional-dependencies bench))
 	touch $@
 
 # Without build isolation, so that CMake finds the same pybind11 again and builds what changed only.
@@ -98,8 +107,19 @@ build/sdist/.tested: $(WHEEL_FILES) $(VENV)/.test-requires | $(VENV)/.installed
 test-python: $(VENV)/.installed $(VENV)/.test-requires ## Python tests, on the installed package
 	cd tests && ../$(BIN)/python -m pytest
 
-bench: $(VENV)/.installed $(VENV)/.test-requires ## the published figures
+# -- Figures --------------------------------------------------------------------------------------
+
+.PHONY: bench bench-all bench-docs bench-cpp
+BENCH_READY := $(VENV)/.installed $(VENV)/.bench-requires bench-cpp
+bench: $(BENCH_READY) ## the published figures, into bench/results (some 15 minutes)
 	$(BIN)/python bench/run.py
+bench-all: $(BENCH_READY) ## the long benchmarks too (more than an hour)
+	$(BIN)/python bench/run.py --all
+bench-docs: $(BENCH_READY) ## as bench, and rewrites docs/performance.md by what it finds
+	$(BIN)/python bench/run.py --docs
+bench-cpp: | bench-packages
+	cmake -S . -B build/bench/cpp -G Ninja -DXCALIB_BENCH=ON -DXCALIB_WERROR=$(WERROR)
+	cmake --build build/bench/cpp
 
 format: $(VENV)/.test-requires | test-packages ## rewrite the code in its style
 	clang-format -i $(CPP_FILES)

@@ -12,6 +12,7 @@ import sys
 
 import numpy as np
 from common import machine
+from figures import figure
 
 from xcalib import synthetic
 from xcalib.footage import Stream, estimate_offset, offsets_around, refine_offset
@@ -76,10 +77,10 @@ def drive(rig, seed, varies):
 
 def told(name, rows):
     errors = [1e3 * abs(error) for trusted, error in rows if trusted]
-    spread = (
-        f"median {np.median(errors):.0f} ms, largest {max(errors):.0f} ms" if errors else "none"
-    )
-    print(f"  {name:<22}{len(errors):>3} of {len(rows)} told, {spread}")
+    figure(f"{name}: told, of {len(rows)}", len(errors))
+    if errors:
+        figure(f"{name}: median error", np.median(errors), "ms")
+        figure(f"{name}: largest error", max(errors), "ms")
 
 
 def main(drives):
@@ -102,9 +103,9 @@ def main(drives):
                 found = refine_offset(rig, visible, thermal, Maps(depths), candidates)
                 refined.append((found.told, found.offset - late))
             speed = "varying" if varies else "steady"
-            print(f"{RATE} and {rate} frames/s, {speed} speed")
-            told("footage alone", alone)
-            told("with the rig", refined)
+            label = f"{RATE} and {rate} frames/s, {speed} speed"
+            told(f"{label}, footage alone", alone)
+            told(f"{label}, with the rig", refined)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+from figures import skipped
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -22,21 +23,23 @@ def data(name: str) -> Path | None:
     folder = base / name
     if folder.is_dir():
         return folder
-    print(f"skipped: {name} is not in {base} (set XCALIB_DATA)")
+    skipped(name, f"not in {base} (set XCALIB_DATA)")
     return None
 
 
-def machine() -> str:
-    """Processor, cores, compiler-independent commit: what a figure must be printed with."""
-    cpu = platform.machine()
+def cpu_model() -> str:
     for line in Path("/proc/cpuinfo").read_text().splitlines():
         if line.startswith("model name"):
-            cpu = line.split(":", 1)[1].strip()
-            break
+            return line.split(":", 1)[1].strip()
+    return platform.machine()
+
+
+def machine() -> str:
+    """Processor, cores, commit: what a figure must be printed with."""
     commit = subprocess.run(
         ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True
     ).stdout.strip()
-    return f"{cpu}, {os.cpu_count()} cores, commit {commit or 'unknown'}"
+    return f"{cpu_model()}, {os.cpu_count()} cores, commit {commit or 'unknown'}"
 
 
 def median_error(found, truth, depths) -> float:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 import cv2
 import numpy as np
 from common import data, machine
+from figures import figure, spread
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
@@ -153,10 +154,11 @@ def main() -> None:
             error = np.abs(dense[judged] - depth[judged]) / depth[judged]
             errors.setdefault((case, name), []).append(error)
         confidences.setdefault(case, []).append(complete(given, guide)[1][judged])
-    print(f"{'':<15}{'':<17}{'median':>8}{'> 10 %':>9}{'ms/frame':>10}")
     for (case, name), parts in errors.items():
-        e, ms = np.concatenate(parts), 1e3 * np.median(seconds[case, name])
-        print(f"{case:<15}{name:<17}{np.median(e):8.2%}{np.mean(e > 0.1):9.1%}{ms:10.0f}")
+        e = 100 * np.concatenate(parts)
+        figure(f"{case}: {name}, median error", np.median(e), "%")
+        figure(f"{case}: {name}, off by more than 10 %", 100 * np.mean(e > 10), "%")
+        spread(f"{case}: {name}, a frame", 1e3 * np.array(seconds[case, name]), "ms")
     print("\nshipped, by its confidence: share of the hidden pixels, share of them off by > 10 %")
     for case, parts in confidences.items():
         c, e = np.concatenate(parts), np.concatenate(errors[case, "xcalib"])

@@ -5,6 +5,7 @@ import time
 import cv2
 import numpy as np
 from common import machine
+from figures import figure
 
 import xcalib
 from xcalib import synthetic
@@ -58,10 +59,9 @@ def steady(noise: float, smooth: bool) -> None:
             still.append(error[known & ~changed])
             moving.append(error[known & changed])
         rms = [np.sqrt(np.mean(np.concatenate(parts) ** 2)) for parts in (flicker, still, moving)]
-        print(
-            f"drive, {'smooth' if smooth else 'pixel'} noise {noise:.0%}, {name}:"
-            f" flicker {rms[0]:.2%}, error {rms[1]:.2%}, where depth has just changed {rms[2]:.2%}"
-        )
+        label = f"{'smooth' if smooth else 'pixel'} noise {noise:.0%}, {name}"
+        for what, value in zip(("flicker", "error", "just changed"), rms, strict=True):
+            figure(f"{label}: {what}", 100 * value, "%")
 
 
 def main() -> None:

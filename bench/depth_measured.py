@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from common import data, machine
+from figures import figure
 
 from xcalib.depth.lidar import project, read_lidar_calibration, read_points, without_hidden
 from xcalib.depth.stereo import StereoGeometry, disparity
@@ -27,11 +28,12 @@ def stereo(folder: Path) -> None:
         for d in (found, truth)
     )
     wrong = np.abs(depth - true_depth)
-    print(
-        f"motorcycle: {both.sum() / known.sum():.1%} of the known pixels matched; of these "
-        f"{np.mean(off > 2):.1%} off by > 2 px; median error {np.median(off):.3f} px, depth "
-        f"{np.median(wrong / true_depth):.2%}, {1e3 * np.median(wrong):.1f} mm; {seconds:.2f} s"
-    )
+    figure("motorcycle: known pixels matched", 100 * both.sum() / known.sum(), "%")
+    figure("motorcycle: of these, off by more than 2 px", 100 * np.mean(off > 2), "%")
+    figure("motorcycle: median error of the disparity", np.median(off), "px")
+    figure("motorcycle: of the depth", 100 * np.median(wrong / true_depth), "%")
+    figure("motorcycle: of the depth, in mm", 1e3 * np.median(wrong), "mm")
+    figure("motorcycle: time", seconds, "s")
 
 
 def lidar(folder: Path) -> None:
@@ -43,10 +45,10 @@ def lidar(folder: Path) -> None:
         seen = without_hidden(depth)
         seconds = time.perf_counter() - start
         before = np.count_nonzero(depth)
-        print(
-            f"kitti {scan.stem}: {before} pixels with a point, "
-            f"{1 - np.count_nonzero(seen) / before:.1%} of them removed, {seconds:.2f} s"
-        )
+        figure(f"kitti {scan.stem}: pixels with a point", before)
+        removed = 100 * (1 - np.count_nonzero(seen) / before)
+        figure(f"kitti {scan.stem}: of them removed as hidden", removed, "%")
+        figure(f"kitti {scan.stem}: time", seconds, "s")
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 from common import machine
+from figures import figure
 from night import NightRig, gains, patches
 
 import xcalib
@@ -46,18 +47,17 @@ def main() -> None:
         "plane, refined": of_plane(found),
         "one depth (homography)": lambda name: np.full((946, 1166), 20.0, np.float32),
     }
-    print(f"{'depth':<24}{'NEC':>8}{'GC':>9}{'patch':>10}{'< 2 px':>8}{'t_x':>9}{'valid':>8}")
     for label, depth in sources.items():
         rig = night.fit(depth).rig
         views = list(night.views(rig, depth))
         (nec, nec_found), (gc, gc_found) = gains(views).values()
         norms, valid = patches(views), np.mean([view.inside.mean() for view in views])
-        print(
-            f"{label:<24}{nec_found / nec - 1:>+8.1%}{gc_found / gc - 1:>+9.0%}"
-            f"{np.median(norms):>7.2f} px{np.mean(norms < 2):>8.0%}{rig.t[0]:>+7.3f} m"
-            f"{valid:>8.0%}",
-            flush=True,
-        )
+        figure(f"{label}: NEC gain", 100 * (nec_found / nec - 1), "%")
+        figure(f"{label}: GC gain", 100 * (gc_found / gc - 1), "%")
+        figure(f"{label}: patch residual", np.median(norms), "px")
+        figure(f"{label}: patch residual under 2 px", 100 * np.mean(norms < 2), "%")
+        figure(f"{label}: t_x", rig.t[0], "m")
+        figure(f"{label}: valid", 100 * valid, "%")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 from common import data, machine
+from figures import figure
 
 import xcalib
 from xcalib.depth import PlaneDepth
@@ -26,8 +27,9 @@ def main() -> None:
     ok = np.isfinite(grid[..., 0])
     distance = np.abs(grid[..., 0] - (x - 52) / 0.889)[ok]
     slope = np.polyfit(y[ok], grid[..., 1][ok], 1)[0]
-    print(f"|x_S - (x - 52) / 0.889|: median {np.median(distance):.1f} px of 640")
-    print(f"vertical scale {slope:.3f} (similarity: {1 / 0.889:.3f})")
+    low, middle, high = np.percentile(distance, [10, 50, 90])
+    figure("|x_S - (x - 52) / 0.889|, of 640 px", middle, "px", low, high)
+    figure(f"vertical scale (similarity: {1 / 0.889:.3f})", slope)
 
 
 if __name__ == "__main__":

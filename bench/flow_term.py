@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 from common import machine, median_error
+from figures import figure
 
 import xcalib
 from xcalib import synthetic
@@ -63,10 +64,10 @@ def main() -> None:
         for name, values in errors.items():
             found = np.array(values) < 1
             middle = np.median(np.array(values)[found]) if found.any() else np.nan
-            print(
-                f"  {name:24s} found {found.sum()} of {len(found)}, their median {middle:.3f} px,"
-                f" {np.median(seconds[name]):.0f} s"
-            )
+            label = f"offset {offset:g}, {name}"
+            figure(f"{label}: found, of {len(found)}", found.sum())
+            figure(f"{label}: median error of those", middle, "px")
+            figure(f"{label}: time", np.median(seconds[name]), "s")
 
 
 if __name__ == "__main__":

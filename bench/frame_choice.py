@@ -12,6 +12,7 @@ from functools import cache
 
 import numpy as np
 from common import data, machine
+from figures import figure
 
 import xcalib
 from xcalib.choose import choose_informed, draw_frames
@@ -47,8 +48,6 @@ def main() -> None:
         scores = evaluate(result.rig, *zip(*map(read, held), strict=True)).registered
         return scores.patch_median, scores.patch_under_2px, result.converged
 
-    print(f"{'frames':>6} {'choice':<9}{'median [px]':>12}{'sd':>7}{'worst':>7}", end="")
-    print(f"{'< 2 px':>9}{'sd':>7}{'worst':>7}{'trusted':>9}{'distinct':>9}")
     for chosen in args.chosen:
         found: dict[str, list[tuple[int, ...]]] = {"spread": [], "informed": []}
         for seed in range(args.seeds):
@@ -60,12 +59,15 @@ def main() -> None:
         for name, sets in found.items():
             results = np.array([judged(frames) for frames in sets], float)
             median, share, trusted = results.T
-            print(f"{chosen:>6} {name:<9}{median.mean():>12.3f}{median.std():>7.3f}", end="")
-            print(f"{median.max():>7.3f}{share.mean():>9.1%}{share.std():>7.1%}", end="")
-            print(
-                f"{share.min():>7.1%}{trusted.sum():>6.0f}/{len(sets)}{len(set(sets)):>9}",
-                flush=True,
-            )
+            label = f"{chosen} frames, {name}"
+            figure(f"{label}: patch residual, mean of the draws", median.mean(), "px")
+            figure(f"{label}: its standard deviation", median.std(), "px")
+            figure(f"{label}: worst", median.max(), "px")
+            figure(f"{label}: under 2 px, mean of the draws", 100 * share.mean(), "%")
+            figure(f"{label}: its standard deviation, in %", 100 * share.std(), "%")
+            figure(f"{label}: worst, in %", 100 * share.min(), "%")
+            figure(f"{label}: trusted, of {len(sets)}", trusted.sum())
+            figure(f"{label}: distinct draws", len(set(sets)))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 from common import machine
+from figures import figure
 from night import NightRig, gains, patches
 
 from xcalib.depth import PlaneDepth
@@ -35,23 +36,26 @@ def main() -> None:
     start = time.perf_counter()
     result = night.fit(depths.__getitem__)
     seconds = time.perf_counter() - start
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
     print(result.report.full())
-    print(f"calibration {seconds:.1f} s, peak memory of the process {peak:.2f} GB")
+    figure("calibration of 32 frames", seconds, "s")
+    figure("peak memory of the process, all frames loaded", peak, "MB")
     print(f"t = {result.rig.t.round(4)} m (thermal camera to the right: t_x < 0)")
 
     views = list(night.views(result.rig, depth))
     whole, same = gains(views), gains(views, same_mask=True)
     for score in whole:
         (before, found), (before_same, _) = whole[score], same[score]
-        print(f"{score:<3} {before:.3f} -> {found:.3f}: {found / before - 1:+.1%}", end="; ")
-        print(f"same mask {before_same:.3f} -> {found:.3f}: {found / before_same - 1:+.1%}")
+        figure(f"{score} unregistered", before)
+        figure(f"{score} unregistered, where the registered source is", before_same)
+        figure(f"{score} registered", found)
+        figure(f"{score} gain", 100 * (found / before - 1), "%")
+        figure(f"{score} gain, same mask", 100 * (found / before_same - 1), "%")
     for image in ("unregistered", "registered"):
         norms = patches(views, image)
-        print(
-            f"patch residual {image}: median {np.median(norms):.2f} px, "
-            f"{np.mean(norms < 2):.1%} under 2 px, {len(norms)} patches"
-        )
+        low, middle, high = np.percentile(norms, [10, 50, 90])
+        figure(f"patch residual, {image}, {len(norms)} patches", middle, "px", low, high)
+        figure(f"patch residual, {image}, under 2 px", 100 * np.mean(norms < 2), "%")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import time
 import cv2
 import numpy as np
 from common import data, machine
+from figures import figure, spread
 from night import SIZE, NightRig, gray
 
 import xcalib
@@ -63,14 +64,13 @@ class Tally:
         self.told += int(told.sum())
         self.pixels += int(known.sum())
 
-    def __str__(self) -> str:
+    def report(self, label: str) -> None:
         e = np.concatenate(self.errors)
-        if not e.size:
-            return "nothing confident"
-        return (
-            f"{self.told / self.pixels:4.0%} of the pixels confident; error median "
-            f"{np.median(e):.2f} px, {np.mean(e < 1):.0%} < 1 px, {np.mean(e > 3):.1%} > 3 px"
-        )
+        figure(f"{label}: confident pixels", 100 * self.told / self.pixels, "%")
+        if e.size:
+            figure(f"{label}: median error", np.median(e), "px")
+            figure(f"{label}: under 1 px", 100 * np.mean(e < 1), "%")
+            figure(f"{label}: over 3 px", 100 * np.mean(e > 3), "%")
 
 
 def rendered(seeds: int) -> None:
@@ -90,7 +90,7 @@ def rendered(seeds: int) -> None:
                 flow, confidence = patch_flow(frame.reference, warped, mask == 0)
                 truth = true_flow(wrong, rig, frame.depth)
                 tally.add(flow, confidence, truth, (mask == 0) & ~street.occluded(1))
-            print(f"rendered {'night' if night else 'day'}, about {offset:2} px off: {tally}")
+            tally.report(f"rendered {'night' if night else 'day'}, about {offset} px off")
 
 
 def shifted_pairs(count: int) -> None:
@@ -116,9 +116,10 @@ def shifted_pairs(count: int) -> None:
             # What the pair's own misalignment is does not change by a shift.
             own, sure = unshifted.setdefault(name, (flow, confidence))
             against_own.add(flow, confidence, own + shift, mask & (sure >= CONFIDENT))
-        print(f"aligned real pairs ({len(names)}), shifted by {offset:2} px: {against_truth}")
+        label = f"aligned real pairs ({len(names)}), shifted by {offset} px"
+        against_truth.report(label)
         if offset:
-            print(f"    against the flow of the pair as it is: {against_own}")
+            against_own.report(f"{label}, against the flow of the pair as it is")
 
 
 def night_rig() -> None:
@@ -144,12 +145,13 @@ def night_rig() -> None:
             if told[y, x]:
                 both.append(np.linalg.norm(flow[y, x] - shift))
     length, patch = np.concatenate(lengths), np.concatenate(patches)
-    print(
-        f"night rig, {len(views)} held-out frames: flow median {np.median(length):.2f} px, "
-        f"{np.mean(length < 2):.0%} under 2 px, {np.mean(shares):.0%} of the pixels confident; "
-        f"patch residual median {np.median(patch):.2f} px, {np.mean(patch < 2):.0%} under 2 px, "
-        f"{len(patch)} patches; the two differ by {np.median(both):.2f} px (median of {len(both)})"
-    )
+    label = f"night rig, {len(views)} held-out frames"
+    figure(f"{label}: flow, median", np.median(length), "px")
+    figure(f"{label}: flow under 2 px", 100 * np.mean(length < 2), "%")
+    figure(f"{label}: confident pixels", 100 * np.mean(shares), "%")
+    figure(f"{label}: patch residual, median, {len(patch)} patches", np.median(patch), "px")
+    figure(f"{label}: patch residual under 2 px", 100 * np.mean(patch < 2), "%")
+    figure(f"{label}: the two differ by, median of {len(both)}", np.median(both), "px")
 
 
 def speed() -> None:
@@ -160,10 +162,7 @@ def speed() -> None:
         start = time.process_time()
         patch_flow(image, image, num_threads=1)
         seconds.append(time.process_time() - start)
-    print(
-        f"{SIZE[0]}x{SIZE[1]}: {np.median(seconds) * 1e3:.0f} ms of processor time, "
-        f"best {min(seconds) * 1e3:.0f}"
-    )
+    spread(f"{SIZE[0]}x{SIZE[1]}: processor time", 1e3 * np.array(seconds), "ms")
 
 
 def main() -> None:

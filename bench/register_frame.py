@@ -11,6 +11,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 from common import machine
+from figures import skipped, spread
 
 import xcalib
 
@@ -31,35 +32,6 @@ def depths() -> list[np.ndarray]:
             depth[200 : 500 + 30 * post, x : x + 40] = 6 + 2 * post
         out.append(depth)
     return out
-
-
-def torch_peer(rig: xcalib.Rig, source: np.ndarray) -> Callable[[np.ndarray], object] | None:
-    """Map and grid_sample in PyTorch; None, said, where it is not installed."""
-    try:
-        import torch
-    except ImportError:
-        print("skipped: PyTorch is not installed")
-        return None
-    torch.set_num_threads(1)
-    y, x = torch.meshgrid(
-        torch.arange(HEIGHT, dtype=torch.float32),
-        torch.arange(WIDTH, dtype=torch.float32),
-        indexing="ij",
-    )
-    h = torch.from_numpy(rig.infinite_homography.astype(np.float32))
-    k = torch.from_numpy((rig.source.K @ rig.t).astype(np.float32))
-    rays = [h[i, 0] * x + h[i, 1] * y + h[i, 2] for i in range(3)]
-    image = torch.from_numpy(source)[None, None]
-    scale = 2 / (source.shape[1] - 1), 2 / (source.shape[0] - 1)
-
-    def run(depth: np.ndarray) -> object:
-        d = torch.from_numpy(depth)
-        u, v, z = (d * ray + k[i] for i, ray in enumerate(rays))
-        grid = torch.stack([u / z * scale[0] - 1, v / z * scale[1] - 1], -1)[None]
-        with torch.no_grad():
-            return torch.nn.functional.grid_sample(image, grid, align_corners=True)
-
-    return run
 
 
 def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object]]:
@@ -106,8 +78,12 @@ def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object
         ),
         "copy": lambda d, _: np.copyto(copied, d),
     }
-    peer = torch_peer(rig, source)
-    if peer is not None:
+    try:
+        from peers.torch_register import registrar
+    except ImportError:
+        skipped("PyTorch map + grid_sample", "PyTorch is not installed")
+    else:
+        peer = registrar(rig, source)
         calls["PyTorch map + grid_sample"] = lambda d, _: peer(d)
     return calls
 
@@ -126,15 +102,11 @@ def main() -> None:
             if i >= 5:
                 times[name].append(time.perf_counter() - start)
     for name, values in times.items():
-        low, median, high = 1e3 * np.percentile(values, [10, 50, 90])
-        print(f"{name:32s} {median:6.2f} ms ({low:.2f}-{high:.2f})")
+        spread(name, 1e3 * np.array(values), "ms")
 
-    def ratio(text: str, above: str, below: str) -> None:
-        if above not in times:
-            return
-        values = np.array(times[above]) / np.array(times[below])
-        low, median, high = np.percentile(values, [10, 50, 90])
-        print(f"{text:58s} {median:5.2f} ({low:.2f}-{high:.2f})")
+    def ratio(text: str, above: str, below: str, target: str | None = None) -> None:
+        if above in times:
+            spread(text, np.array(times[above]) / np.array(times[below]), "", target)
 
     ratio("numpy map + cv2.remap takes, times ours", "numpy map + cv2.remap", "float32")
     ratio("PyTorch map + grid_sample takes, times ours", "PyTorch map + grid_sample", "float32")

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 from common import machine, median_error
+from figures import figure, spread
 
 import xcalib
 from xcalib import synthetic
@@ -35,13 +36,15 @@ def main() -> None:
             flush=True,
         )
     error, trusted = np.array(errors), np.array(converged)
-    print(f"{len(error)} rigs, median of the median end-point errors {np.median(error):.3f} px")
-    print(f"under 0.3 px: {np.sum(error < 0.3)}, under 1 px: {np.sum(error < 1)}")
-    print(
-        f"reported as converged: {trusted.sum()}, of these over 1 px: {(error[trusted] > 1).sum()}"
-    )
-    print(f"under 1 px but reported as not converged: {np.sum(~trusted & (error < 1))}")
-    print(f"median time {np.median(seconds):.1f} s")
+    spread("median end-point error of a rig", error, "px")
+    figure("worst of them", error.max(), "px")
+    figure("rigs", len(error))
+    figure("under 0.3 px", np.sum(error < 0.3))
+    figure("under 1 px", np.sum(error < 1))
+    figure("reported as converged", trusted.sum())
+    figure("reported as converged, over 1 px", (error[trusted] > 1).sum(), target="<= 0")
+    figure("under 1 px but reported as not converged", np.sum(~trusted & (error < 1)))
+    spread("time of a calibration", seconds, "s")
 
 
 if __name__ == "__main__":
