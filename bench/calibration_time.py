@@ -2,8 +2,8 @@
 
 Two threads throughout; every run is a process of its own, which measures the fit alone: frames are
 in memory, modules loaded. The peer takes the published 120 steps (15 epochs of 32 frames by 4)
-without its flow network, which would only add to its time; since nothing but its edges leads it, the
-rig rendered for the comparison lies 7 px from where it starts. Ours starts from nothing and
+without its flow network, which would only add to its time; since nothing but its edges leads it,
+the rig rendered for the comparison lies 7 px from where it starts. Ours starts from nothing and
 searches. Both results are judged by both objectives.
 
     calibration_time.py                       all of it
@@ -90,9 +90,7 @@ def load(folder: Path, count: int, width: int | None = None) -> Sets:
 
 def memory() -> tuple[float, float]:
     """Now, and at its highest [MB]: of this process alone (ru_maxrss has its parent's too)."""
-    status = dict(
-        line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines()
-    )
+    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
     return tuple(int(status[k].split()[0]) / 1e3 for k in ("VmRSS", "VmHWM"))  # type: ignore
 
 
@@ -152,7 +150,7 @@ def in_process(contestant: str, folder: Path, count: int, width: int | None = No
 
 
 def our_loss(rig: xcalib.Rig, sets: Sets) -> float:
-    """Eq. (image_loss) of the objective of this library: what its first step of Adam starts from."""
+    """Eq. (image_loss) of this library's objective: what its first step of Adam starts from."""
     count = len(sets[0])
     options = xcalib.CalibrationOptions(
         solver="adam",
@@ -245,7 +243,7 @@ def breakdown(result: dict) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=("peer", "frames", "pixels"))
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--run", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.run:

@@ -20,7 +20,9 @@ def meets(value: float, target: str) -> bool:
     """`target`: a comparison and a number. Raises ValueError for anything else."""
     sign, _, limit = target.partition(" ")
     if sign not in _COMPARE:
-        raise ValueError(f"target is {target!r}, expected one of {', '.join(_COMPARE)} and a number")
+        raise ValueError(
+            f"target is {target!r}, expected one of {', '.join(_COMPARE)} and a number"
+        )
     return bool(_COMPARE[sign](value, float(limit)))
 
 

@@ -1,10 +1,10 @@
 """The published benchmarks, one after the other: printed, and kept in bench/results.
 
-    run.py            those that say how fast, and how good, in some 15 minutes on two cores
-    run.py --all      the long ones too
-    run.py NAME ...   these
-    run.py --docs     writes the tables of docs/performance.md and its picture from what was found
-    run.py --docs-only [results.json]    writes them from results kept before
+run.py            those that say how fast, and how good, in some 15 minutes on two cores
+run.py --all      the long ones too
+run.py NAME ...   these
+run.py --docs     writes the tables of docs/performance.md and its picture from what was found
+run.py --docs-only [results.json]    writes them from results kept before
 """
 
 import argparse

@@ -257,7 +257,11 @@ void add_context() {
         return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(patch);
     };
     benchmark::AddCustomContext("highway_target", highway_target());
-    benchmark::AddCustomContext("compiler", "GCC-compatible " __VERSION__);
+#ifdef __clang__
+    benchmark::AddCustomContext("compiler", __VERSION__);
+#else
+    benchmark::AddCustomContext("compiler", "GCC " __VERSION__);
+#endif
     benchmark::AddCustomContext(
         "Ceres", version(CERES_VERSION_MAJOR, CERES_VERSION_MINOR, CERES_VERSION_REVISION));
     benchmark::AddCustomContext(

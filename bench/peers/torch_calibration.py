@@ -1,10 +1,10 @@
 """The paper's calibration in PyTorch, written from the paper: autograd, Adam, two stages.
 
 Without the flow term, whose network is not ours to ship. Equation names are the paper's; where it
-leaves something open, this follows docs/method.md: gradients are forward differences, a pixel counts
-where its whole stencil is seen by the source camera, and the lower clamp of Eq. (gradient_clamping)
-is off unless asked for. Pixel centres lie at integer coordinates. The C++ twin is
-`CalibrationOptions(solver="adam")`, which has the objective of this library.
+leaves something open, this follows docs/method.md: gradients are forward differences, a pixel
+counts where its whole stencil is seen by the source camera, and the lower clamp of
+Eq. (gradient_clamping) is off unless asked for. Pixel centres lie at integer coordinates. The C++
+twin is `CalibrationOptions(solver="adam")`, which has the objective of this library.
 """
 
 import math
@@ -52,7 +52,7 @@ def gray(image: np.ndarray) -> np.ndarray:
 
 
 class Camera:
-    """Eqs. (intrinsic) and (focal_lengths): unconstrained variables, and the matrix they stand for."""
+    """Eqs. (intrinsic) and (focal_lengths): unconstrained variables, and their matrix."""
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width, height
