@@ -9,6 +9,7 @@ write at least, as bench/cpp/kernels.cpp counts them. One thread.
 
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -58,9 +59,9 @@ def flops_per_pixel(kernel: str, edges: float) -> float | None:
 
 
 def samples(kernels: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
-    """The repetitions of each benchmark."""
+    """The repetitions of each benchmark, which ran in turns; in the order of kernels.cpp."""
     found: dict[str, list[dict[str, Any]]] = {}
-    for entry in kernels["benchmarks"]:
+    for entry in sorted(kernels["benchmarks"], key=lambda entry: entry["family_index"]):
         if entry["run_type"] == "iteration":
             found.setdefault(entry["run_name"], []).append(entry)
     return found
@@ -105,35 +106,66 @@ def points(found: dict[str, list[dict[str, Any]]]) -> dict[str, tuple[float, flo
     return out
 
 
-def figures_of(kernels: dict[str, Any]) -> list[dict[str, Any]]:
-    """As figures.py has them: times, with their spread, then bytes a second and flops."""
-    found = samples(kernels)
-    speeds = copies(found)
-    peak, near, far = roofs(found)
-    flops = points(found)
+@dataclass(frozen=True)
+class Row:
+    """A kernel: times of a call [ms], then what it makes of its bytes and arithmetic."""
 
-    def entry(name: str, value: float, unit: str, **rest: float) -> dict[str, Any]:
-        return {"name": name, "value": value, "unit": unit, **rest}
+    name: str
+    times: tuple[float, float, float]  # 10, 50, 90 %
+    speed: float  # [bytes / s]
+    share: float  # of the speed of a copy as large
+    flops: float | None  # [1 / s]
 
-    out = [
-        entry("multiply-adds, one thread", peak / 1e9, "GFLOP/s"),
-        entry("copy, as large as the kernels' data", near / 1e9, "GB/s"),
-        entry("copy, 256 MB", far / 1e9, "GB/s"),
-    ]
+
+def rows(found: dict[str, list[dict[str, Any]]]) -> list[Row]:
+    speeds, flops, out = copies(found), points(found), []
     for name, entries in found.items():
         if "pixels" not in entries[0]:
             continue
-        times = np.array([e["cpu_time"] for e in entries])  # [ms]
-        low, middle, high = (float(v) for v in np.percentile(times, [10, 50, 90]))
-        size = int(entries[0]["bytes"])
-        speed = median(entries, "bytes_per_second")
-        beside = speeds[min(speeds, key=lambda s: abs(s - size))]
-        out.append(entry(name, middle, "ms", low=low, high=high))
-        out.append(entry(f"{name}, of its bytes", speed / 1e9, "GB/s"))
-        out.append(entry(f"{name}, of a copy as large", 100 * speed / beside, "%"))
-        if name in flops:
-            out.append(entry(f"{name}, of its arithmetic", flops[name][1] / 1e9, "GFLOP/s"))
+        low, middle, high = np.percentile([e["cpu_time"] for e in entries], [10, 50, 90])
+        speed, size = median(entries, "bytes_per_second"), int(entries[0]["bytes"])
+        beside = speeds[min(speeds, key=lambda s, size=size: abs(s - size))]
+        rate = flops[name][1] if name in flops else None
+        out.append(Row(name, (float(low), float(middle), float(high)), speed, speed / beside, rate))
     return out
+
+
+def figures_of(kernels: dict[str, Any]) -> list[dict[str, Any]]:
+    """The machine's and the kernels', as figures.py has them."""
+    found = samples(kernels)
+    peak, near, far = roofs(found)
+    out: list[dict[str, Any]] = [
+        {"name": "multiply-adds, one thread", "value": peak / 1e9, "unit": "GFLOP/s"},
+        {"name": "copy, as large as the kernels' data", "value": near / 1e9, "unit": "GB/s"},
+        {"name": "copy, 256 MB", "value": far / 1e9, "unit": "GB/s"},
+    ]
+    for row in rows(found):
+        low, middle, high = row.times
+        out.append({"name": row.name, "value": middle, "unit": "ms", "low": low, "high": high})
+        share = {"name": f"{row.name}, of a copy's speed", "value": 100 * row.share, "unit": "%"}
+        out.append(share)
+    return out
+
+
+def table(kernels: dict[str, Any]) -> str:
+    """The same with a kernel a line, for the page."""
+    found = samples(kernels)
+    peak, near, far = roofs(found)
+    lines = [
+        f"Multiply-adds: {peak / 1e9:.0f} GFLOP/s. A copy: {near / 1e9:.1f} GB/s (as many bytes as "
+        f"the kernels', median), {far / 1e9:.1f} GB/s (256 MB).",
+        "",
+        "| kernel | ms | 10-90 % | GB/s | of a copy as large | GFLOP/s |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in rows(found):
+        low, middle, high = row.times
+        flops = "" if row.flops is None else f"{row.flops / 1e9:.1f}"
+        lines.append(
+            f"| {row.name} | {middle:.3g} | {low:.3g} - {high:.3g} | {row.speed / 1e9:.2f} | "
+            f"{row.share:.1%} | {flops} |"
+        )
+    return "\n".join(lines) + "\n"
 
 
 def draw(kernels: dict[str, Any], machine: dict[str, Any], path: Path) -> None:
@@ -158,15 +190,13 @@ def draw(kernels: dict[str, Any], machine: dict[str, Any], path: Path) -> None:
         family = name.split("/")[0]
         colour = f"C{list(families).index(family)}"
         axes.plot(x, y / 1e9, markers[family], color=colour, label=families[family] or "_")
-    offsets: dict[tuple[int, int], int] = {}
-    for name, (x, y) in sorted(at.items(), key=lambda item: -item[1][1]):
-        if name.startswith("register/") and not name.startswith(("register/f32/", "register/u8/")):
-            continue  # the others lie among them; the table has them all
-        cell = round(3 * np.log2(x)), round(2 * np.log2(y))
-        turn = offsets[cell] = offsets.get(cell, -1) + 1
-        axes.annotate(
-            name, (x, y / 1e9), (6, -3 - 9 * turn), textcoords="offset points", fontsize=7
-        )
+    for name, (x, y) in at.items():
+        if name.startswith("register/") and "/f32/" not in name:
+            continue  # they lie among one another; the table has them all
+        label = f"{name} " if name.startswith("register/") else f" {name}"
+        side = "right" if name.startswith("register/") else "left"
+        height = "top" if name == "nec/normal_equations/11" else "bottom"
+        axes.annotate(label, (x, y / 1e9), ha=side, va=height, fontsize=7)
     axes.set(xscale="log", yscale="log", xlim=(0.5, 1000))
     axes.set_xlabel("arithmetic intensity [flop / byte]")
     axes.set_ylabel("GFLOP/s, one thread")

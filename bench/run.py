@@ -20,6 +20,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import roofline
 from common import ROOT, cpu_model
 from figures import KEPT_IN
 
@@ -88,8 +89,6 @@ def run_script(name: str) -> tuple[list[dict[str, Any]], bool]:
 
 def run_kernels(found: dict[str, Any]) -> tuple[list[dict[str, Any]], bool]:
     """The C++ ones, whose own JSON is kept whole; what they know of the machine goes with it."""
-    import roofline
-
     if not KERNELS.is_file():
         reason = "not built (make bench builds it)"
         print(f"skipped: kernels: {reason}")
@@ -166,6 +165,8 @@ def write_docs(found: dict[str, Any]) -> None:
         name = match[2]
         if name == "machine":
             body = "\n" + machine_text(found) + "\n"
+        elif name == "kernels" and "kernels" in found:
+            body = "\n" + roofline.table(found["kernels"]) + "\n"
         elif name in found["figures"]:
             body = "\n" + table(found["figures"][name]) + "\n"
         else:
@@ -174,8 +175,6 @@ def write_docs(found: dict[str, Any]) -> None:
 
     write_whole(DOCS, FIGURES_OF.sub(fill, DOCS.read_text()))
     if "kernels" in found:
-        import roofline
-
         roofline.draw(found["kernels"], found["machine"], ROOFLINE)
 
 
