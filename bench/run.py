@@ -76,13 +76,14 @@ def machine() -> dict[str, Any]:
 # -- Running -------------------------------------------------------------------------------------
 
 
-def run_script(name: str) -> tuple[list[dict[str, Any]], bool]:
+def run_script(name: str, arguments: list[str]) -> tuple[list[dict[str, Any]], bool]:
     """Its figures, and whether it came to its end."""
     with tempfile.TemporaryDirectory() as folder:
         kept = Path(folder) / "figures"
         kept.touch()
         done = subprocess.run(
-            [sys.executable, str(BENCH / f"{name}.py")], env=os.environ | {KEPT_IN: str(kept)}
+            [sys.executable, str(BENCH / f"{name}.py"), *arguments],
+            env=os.environ | {KEPT_IN: str(kept)},
         )
         return [json.loads(line) for line in kept.read_text().splitlines()], done.returncode == 0
 
@@ -186,6 +187,7 @@ def main() -> int:
     parser.add_argument("--all", action="store_true")
     parser.add_argument("--docs", action="store_true")
     parser.add_argument("--docs-only", nargs="?", const="", metavar="RESULTS")
+    parser.add_argument("--rounds", type=int, default=2, help="of calibration_time")
     args = parser.parse_args()
     if unknown := set(args.names) - {*SHORT, *LONG}:
         parser.error(f"no benchmark {sorted(unknown)}, expected some of {[*SHORT, *LONG]}")
@@ -211,7 +213,8 @@ def main() -> int:
     for name in args.names or (SHORT + LONG if args.all else SHORT):
         print(f"== {name}", flush=True)
         start = time.perf_counter()
-        figures, whole = run_kernels(found) if name == "kernels" else run_script(name)
+        options = ["--rounds", str(args.rounds)] if name == "calibration_time" else []
+        figures, whole = run_kernels(found) if name == "kernels" else run_script(name, options)
         if not whole:
             failed.append(name)
         found["figures"][name] = figures
