@@ -27,15 +27,26 @@ void gray_rows(const ImageView& image, float scale, Image& gray) {
     }
 }
 
-// A sample of about 20 000 pixels is enough for percentiles and costs little.
-std::vector<float> sorted_sample(const Image& image) {
-    const std::size_t step = std::max<std::size_t>(1, image.pixels.size() / 20000);
-    std::vector<float> sample;
-    sample.reserve(image.pixels.size() / step + 1);
-    for (std::size_t i = 0; i < image.pixels.size(); i += step) sample.push_back(image.pixels[i]);
-    std::sort(sample.begin(), sample.end());
-    return sample;
-}
+// Percentiles of a sample of about 20 000 pixels, which is enough and costs little.
+class Percentiles {
+   public:
+    explicit Percentiles(const Image& image) {
+        const std::size_t step = std::max<std::size_t>(1, image.pixels.size() / 20000);
+        sample_.reserve(image.pixels.size() / step + 1);
+        for (std::size_t i = 0; i < image.pixels.size(); i += step)
+            sample_.push_back(image.pixels[i]);
+    }
+    // The value with `share` of the others below it, [0, 1].
+    float at(double share) {
+        const double place = share * static_cast<double>(sample_.size() - 1);
+        const auto value = sample_.begin() + std::lround(place);
+        std::nth_element(sample_.begin(), value, sample_.end());
+        return *value;
+    }
+
+   private:
+    std::vector<float> sample_;
+};
 
 bool known(float depth) { return depth > 0.0f && std::isfinite(depth); }
 
@@ -140,9 +151,8 @@ Image gaussian_blur(const Image& image, double sigma_px) {
 }
 
 Image normalize_percentiles(const Image& image) {
-    const std::vector<float> sample = sorted_sample(image);
-    float low = sample[sample.size() / 100];
-    float high = sample[sample.size() - 1 - sample.size() / 100];
+    Percentiles percentiles(image);
+    float low = percentiles.at(0.01), high = percentiles.at(0.99);
     if (!(high > low)) {  // nearly all pixels equal: take what there is
         const auto [min, max] = std::minmax_element(image.pixels.begin(), image.pixels.end());
         low = *min;
@@ -162,8 +172,7 @@ Image normalize_dark(const Image& image) {
     constexpr float kMedian = 0.4f;
     constexpr float kStrongest = 100.0f;
     Image out = normalize_percentiles(image);
-    const std::vector<float> sample = sorted_sample(out);
-    const float median = sample[sample.size() / 2];
+    const float median = Percentiles(out).at(0.5);
     if (median >= kMedian) return out;
     float low = 0.0f, high = kStrongest;
     for (int i = 0; i < 30; ++i) {

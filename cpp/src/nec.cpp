@@ -70,18 +70,22 @@ EdgeField edge_field(const Image& image, float mean_magnitude) {
     EdgeField field{image.width, image.height, {}, {}};
     field.x.assign(image.pixels.size(), 0.0f);
     field.y.assign(image.pixels.size(), 0.0f);
-    for (int y = 1; y + 1 < image.height; ++y)
-        for (int x = 1; x + 1 < image.width; ++x) {
-            const float* p = image.row(y) + x;
-            const float gx = 0.5f * (p[1] - p[-1]);
-            const float gy = 0.5f * (p[image.width] - p[-image.width]);
+    for (int y = 1; y + 1 < image.height; ++y) {
+        const float* here = image.row(y);
+        const float *above = image.row(y - 1), *below = image.row(y + 1);
+        float* out_x = field.x.data() + static_cast<std::size_t>(y) * image.width;
+        float* out_y = field.y.data() + static_cast<std::size_t>(y) * image.width;
+#pragma GCC ivdep
+        for (int x = 1; x < image.width - 1; ++x) {
+            const float gx = 0.5f * (here[x + 1] - here[x - 1]);
+            const float gy = 0.5f * (below[x] - above[x]);
             const float g = std::sqrt(gx * gx + gy * gy);
-            if (!(g > floor)) continue;
-            const float rise = std::min(g, cap) - floor;
-            const std::size_t i = static_cast<std::size_t>(y) * image.width + x;
-            field.x[i] = gx * rise / g;
-            field.y[i] = gy * rise / g;
+            const float rise = std::max(std::min(g, cap) - floor, 0.0f);
+            const float scale = rise / (g > 0 ? g : 1.0f);
+            out_x[x] = gx * scale;
+            out_y[x] = gy * scale;
         }
+    }
     return field;
 }
 

@@ -26,19 +26,26 @@ constexpr int kNumBlocks = 8;
 CompressedBlock compress(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& gradient,
                          double cost) {
     const Eigen::Index count = hessian.rows();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian);
+    // In units in which every parameter bends the cost alike: what is lost by rounding is then a
+    // share of each, not of the greatest.
+    const Eigen::VectorXd unit = hessian.diagonal().unaryExpr(
+        [](double curvature) { return curvature > 0 ? std::sqrt(curvature) : 1.0; });
+    const Eigen::VectorXd inverse = unit.cwiseInverse();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse.asDiagonal() * hessian *
+                                                               inverse.asDiagonal());
     const Eigen::VectorXd& values = eigen.eigenvalues();
     const Eigen::MatrixXd& vectors = eigen.eigenvectors();
-    // Eigenvalues below rounding carry no direction: g has no part there either.
-    const double smallest = values[count - 1] * 1e-14;
+    // Eigenvalues below the rounding of sums of floats carry no direction: g has no part there
+    // either.
+    const double smallest = values[count - 1] * 1e-8;
     CompressedBlock block;
     block.jacobian = Eigen::MatrixXd::Zero(count + 1, count);
     block.residuals = Eigen::VectorXd::Zero(count + 1);
     for (Eigen::Index i = 0; i < count; ++i) {
         if (!(values[i] > smallest)) continue;
         const double root = std::sqrt(values[i]);
-        block.jacobian.row(i) = root * vectors.col(i).transpose();
-        block.residuals[i] = vectors.col(i).dot(gradient) / root;
+        block.jacobian.row(i) = root * vectors.col(i).cwiseProduct(unit).transpose();
+        block.residuals[i] = vectors.col(i).cwiseProduct(inverse).dot(gradient) / root;
     }
     block.residuals[count] =
         std::sqrt(std::max(0.0, 2 * cost - block.residuals.head(count).squaredNorm()));

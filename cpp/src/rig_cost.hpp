@@ -11,8 +11,8 @@
 namespace xcalib {
 
 // J^T J, J^T r and c = |r|^2 / 2 of any number of rows, as count + 1 rows that have the same:
-//     H = V L V^T,  J' = L^(1/2) V^T,  r' = L^(-1/2) V^T g (pseudo-inverse),
-//     and one row of zeros with residual sqrt(2 c - |r'|^2).
+//     H = S V L V^T S,  J' = L^(1/2) V^T S,  r' = L^(-1/2) V^T S^-1 g (pseudo-inverse),
+//     S = diag(H)^(1/2), and one row of zeros with residual sqrt(2 c - |r'|^2).
 struct CompressedBlock {
     Eigen::MatrixXd jacobian;   // (count + 1) x count
     Eigen::VectorXd residuals;  // count + 1

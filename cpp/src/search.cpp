@@ -100,8 +100,24 @@ Spectrum spectrum_of(const Complex* values, const DirectionMap& map, cv::Size si
     return padded;
 }
 
-Spectrum spectrum_of(const std::vector<float>& real, const DirectionMap& map, cv::Size size) {
-    return spectrum_of(std::vector<Complex>(real.begin(), real.end()).data(), map, size);
+// The spectra of two real maps, by one transform of both.
+std::array<Spectrum, 2> spectra_of(const std::vector<Complex>& both, const DirectionMap& map,
+                                   cv::Size size) {
+    const Spectrum joint = spectrum_of(both.data(), map, size);
+    std::array<Spectrum, 2> out{Spectrum(size, CV_32FC2), Spectrum(size, CV_32FC2)};
+    for (int y = 0; y < size.height; ++y) {
+        const Complex* here = joint.ptr<Complex>(y);
+        const Complex* mirrored = joint.ptr<Complex>(y > 0 ? size.height - y : 0);
+        Complex* real = out[0].ptr<Complex>(y);
+        Complex* imaginary = out[1].ptr<Complex>(y);
+        for (int x = 0; x < size.width; ++x) {
+            const Complex a = here[x], b = std::conj(mirrored[x > 0 ? size.width - x : 0]);
+            real[x] = 0.5f * (a + b);
+            const Complex difference = 0.5f * (a - b);
+            imaginary[x] = {difference.imag(), -difference.real()};
+        }
+    }
+    return out;
 }
 
 // All that one hypothesis of a camera gives: a spectrum per frame, and the pooled energy and mask.
@@ -116,16 +132,19 @@ CameraSpectra camera_spectra(const std::vector<EdgeMap>& images, const Direction
                              cv::Size size) {
     CameraSpectra out;
     const MapSampler sampler = map_sampler(map, camera, camera_from_map);
-    std::vector<float> energy(sampler.u.size(), 0.0f), mask(sampler.u.size());
+    std::vector<Complex> both(sampler.u.size());  // energy and mask
     for (const EdgeMap& image : images) {
         const std::vector<Complex> drawn = draw(image, sampler);
-        for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += std::norm(drawn[i]);
+        for (std::size_t i = 0; i < both.size(); ++i) both[i] += std::norm(drawn[i]);
         out.frames.push_back(spectrum_of(drawn.data(), map, size));
     }
-    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = sampler.u[i] >= 0;
-    for (float e : energy) out.total_energy += e;
-    out.energy = spectrum_of(energy, map, size);
-    out.mask = spectrum_of(mask, map, size);
+    for (std::size_t i = 0; i < both.size(); ++i) {
+        out.total_energy += both[i].real();
+        if (sampler.u[i] >= 0) both[i].imag(1.0f);
+    }
+    auto [energy, mask] = spectra_of(both, map, size);
+    out.energy = energy;
+    out.mask = mask;
     return out;
 }
 

@@ -98,9 +98,8 @@ double seconds_now() {
 NecValue pooled(const Level& level, const Rig& rig, int num_threads) {
     const Rig at_level = level.rig_at(rig);
     std::vector<NecValue> values(level.pairs.size());
-    parallel_ranges(static_cast<int>(values.size()), num_threads, [&](int begin, int end) {
-        for (int i = begin; i < end; ++i) values[i] = level.pairs[i]->evaluate(at_level);
-    });
+    parallel_each(static_cast<int>(values.size()), num_threads,
+                  [&](int i) { values[i] = level.pairs[i]->evaluate(at_level); });
     NecValue sum;
     for (std::size_t i = 0; i < values.size(); ++i) {
         sum.nec += level.weights[i] * values[i].nec;

@@ -151,11 +151,9 @@ template <class Variant>
 void choose_best(const Level& level, int num_threads, int count, const Variant& variant,
                  Candidate& candidate) {
     std::vector<double> merits(count);
-    parallel_ranges(count, num_threads, [&](int begin, int end) {
-        for (int i = begin; i < end; ++i) {
-            const Rig rig = variant(i);
-            merits[i] = preference(rig) * merit(pooled(level, rig, 1));
-        }
+    parallel_each(count, num_threads, [&](int i) {
+        const Rig rig = variant(i);
+        merits[i] = preference(rig) * merit(pooled(level, rig, 1));
     });
     const int best =
         static_cast<int>(std::max_element(merits.begin(), merits.end()) - merits.begin());
@@ -265,7 +263,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
                  const ImageView& source, const std::optional<Rig>& initial,
                  const CalibrationOptions& options, const FlowEstimator& flow,
                  const std::function<void(double)>& progress) {
-    constexpr std::size_t kFrames = 12;
+    constexpr std::size_t kFrames = 12, kSearched = 8;
     const WorkingImages images = all_images.spread(kFrames);
     const int num_threads = options.num_threads;
     const double start = seconds_now();
@@ -274,7 +272,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     std::vector<SearchCandidate> found;
     const bool searches = options.search.mode != SearchMode::off;
     if (searches) {
-        found = global_search(images.reference_edges, images.source_edges,
+        found = global_search(spread(images.reference_edges, kSearched),
+                              spread(images.source_edges, kSearched),
                               search_space(reference, source, initial, options), num_threads);
     } else {
         SearchCandidate given;

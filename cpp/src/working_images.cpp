@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -50,18 +51,28 @@ void for_frame(const char* name, int index, const Work& work) {
 // source camera may not see there at all, and the step between them moves with the depth, not the
 // rig.
 Image without_depth_edges(const Image& depth) {
-    constexpr float kEdge = 1.1f;
+    constexpr float kEdge = 1.1f, kFar = std::numeric_limits<float>::max();
+    const int width = depth.width;
     Image out = depth;
-    for (int y = 0; y < depth.height; ++y)
-        for (int x = 0; x < depth.width; ++x) {
-            const float here = depth.row(y)[x];
-            for (int v = std::max(0, y - 1); v <= std::min(depth.height - 1, y + 1); ++v)
-                for (int u = std::max(0, x - 1); u <= std::min(depth.width - 1, x + 1); ++u) {
-                    const float there = depth.row(v)[u];
-                    if (there > 0 && (there > here * kEdge || there * kEdge < here))
-                        out.row(y)[x] = 0.0f;
-                }
+    // The nearest and farthest known depths of three rows, with a column more at both ends.
+    std::vector<float> nearest(width + 2, kFar), farthest(width + 2, 0.0f);
+    for (int y = 0; y < depth.height; ++y) {
+        const float* rows[] = {depth.row(std::max(0, y - 1)), depth.row(y),
+                               depth.row(std::min(depth.height - 1, y + 1))};
+        float *near = nearest.data() + 1, *far = farthest.data() + 1;
+        for (int x = 0; x < width; ++x) {
+            const float a = rows[0][x], b = rows[1][x], c = rows[2][x];
+            far[x] = std::max(a, std::max(b, c));
+            near[x] = std::min(a > 0 ? a : kFar, std::min(b > 0 ? b : kFar, c > 0 ? c : kFar));
         }
+        float* to = out.row(y);
+        for (int x = 0; x < width; ++x) {
+            const float here = rows[1][x];
+            const float most = std::max(far[x - 1], std::max(far[x], far[x + 1]));
+            const float least = std::min(near[x - 1], std::min(near[x], near[x + 1]));
+            to[x] = most > here * kEdge || least * kEdge < here ? 0.0f : here;
+        }
+    }
     return out;
 }
 
@@ -153,10 +164,9 @@ WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) con
 }
 
 WorkingImages WorkingImages::spread(std::size_t count) const {
-    count = std::min(count, size());
-    std::vector<std::size_t> indices;
-    for (std::size_t i = 0; i < count; ++i) indices.push_back(i * size() / count);
-    return subset(indices);
+    std::vector<std::size_t> indices(size());
+    std::iota(indices.begin(), indices.end(), 0);
+    return subset(xcalib::spread(indices, count));
 }
 
 namespace {
