@@ -12,6 +12,7 @@
 
 #include "xcalib/calibrate.hpp"
 #include "xcalib/flow.hpp"
+#include "xcalib/gray.hpp"
 #include "xcalib/metrics.hpp"
 #include "xcalib/nec.hpp"
 #include "xcalib/register.hpp"

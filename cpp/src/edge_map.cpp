@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "mat.hpp"
+#include "xcalib/gray.hpp"
 #include "xcalib/nec.hpp"
 
 namespace xcalib {

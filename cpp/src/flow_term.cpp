@@ -6,6 +6,7 @@
 #include <string>
 
 #include "parallel.hpp"
+#include "xcalib/gray.hpp"
 #include "xcalib/warp.hpp"
 
 namespace xcalib {

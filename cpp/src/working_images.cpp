@@ -8,6 +8,7 @@
 #include <string>
 
 #include "parallel.hpp"
+#include "xcalib/gray.hpp"
 
 namespace xcalib {
 namespace {

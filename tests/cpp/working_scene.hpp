@@ -6,6 +6,7 @@
 
 #include "scenes.hpp"
 #include "working_images.hpp"
+#include "xcalib/gray.hpp"
 
 namespace xcalib::testing {
 

@@ -10,10 +10,11 @@
 #include <vector>
 
 #include "xcalib/camera.hpp"
+#include "xcalib/export.hpp"
 #include "xcalib/flow.hpp"
 #include "xcalib/image.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 enum class SearchMode {
     automatic,  // full without an initial rig, local with one

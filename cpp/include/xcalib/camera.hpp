@@ -9,7 +9,9 @@
 #include <Eigen/Geometry>
 #include <optional>
 
-namespace xcalib {
+#include "xcalib/export.hpp"
+
+namespace XCALIB_EXPORT xcalib {
 
 // A pinhole camera, Eq. (intrinsic): u = fx X/Z + skew Y/Z + cx, v = fy Y/Z + cy.
 struct Pinhole {

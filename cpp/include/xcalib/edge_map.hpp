@@ -8,9 +8,10 @@
 #include <complex>
 #include <vector>
 
+#include "xcalib/export.hpp"
 #include "xcalib/image.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 struct EdgeMap {
     int width = 0;

@@ -8,9 +8,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "xcalib/export.hpp"
 #include "xcalib/image.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 struct FlowOptions {
     int step = 7;    // [px] of the grid, odd: a vector stands on a pixel; >= 3

@@ -1,11 +1,13 @@
-// Images: views on the caller's pixels, gray working images, depth maps, and how they are reduced.
+// Images: views on the caller's pixels, one-channel images, and depth maps on other grids.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-namespace xcalib {
+#include "xcalib/export.hpp"
+
+namespace XCALIB_EXPORT xcalib {
 
 enum class PixelType : std::uint8_t { u8, u16, f32 };
 
@@ -53,25 +55,6 @@ struct Image {
                 PixelType::f32, static_cast<std::ptrdiff_t>(width * sizeof(float))};
     }
 };
-
-// Luma in [0, 1] for integers (of the type's full range), as it is for float32.
-// Throws std::invalid_argument, with the place, where a float32 pixel is not finite.
-Image to_gray(const ImageView& image);
-
-// Mean over the area that each new pixel covers; bilinear where a side grows.
-Image resize_area(const Image& image, int width, int height);
-
-Image gaussian_blur(const Image& image, double sigma_px);
-
-// Stretches the 1st to 99th percentile to [0, 1] (beyond is clipped): thermal images, raw 16-bit
-// counts above all, use a small part of their range.
-// Throws std::invalid_argument where the image is constant.
-Image normalize_percentiles(const Image& image);
-
-// The same, then log(1 + k x) / log(1 + k) with the k that takes the median to 0.4 (none where it
-// lies above already, at most 100): night images keep their detail in the lowest few per cent of
-// the range.
-Image normalize_dark(const Image& image);
 
 // A copy in which everything that is not a depth (0, negative, NaN, inf) is 0.
 Image clean_depth(const ImageView& depth);

@@ -6,9 +6,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "xcalib/export.hpp"
 #include "xcalib/image.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 // Gradient correlation: the mean over x and y of the zero-mean normalized correlation of the
 // absolute forward differences. In [-1, 1].

@@ -11,10 +11,11 @@
 #include <vector>
 
 #include "xcalib/camera.hpp"
+#include "xcalib/export.hpp"
 #include "xcalib/image.hpp"
 #include "xcalib/warp.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 // Eq. (nec) with forward differences and Eq. (gradient_clamping), as the metric is published.
 enum class NecFloor {

@@ -5,10 +5,11 @@
 #include <memory>
 
 #include "xcalib/camera.hpp"
+#include "xcalib/export.hpp"
 #include "xcalib/image.hpp"
 #include "xcalib/warp.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 // Reference pixels that the source camera sees something nearer in front of.
 enum class Occlusion {

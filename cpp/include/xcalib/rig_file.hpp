@@ -4,8 +4,9 @@
 #include <string>
 
 #include "xcalib/camera.hpp"
+#include "xcalib/export.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 // Throws std::system_error where the file cannot be read, std::invalid_argument, naming the file,
 // the field, its value and what was expected, where it is not a rig.

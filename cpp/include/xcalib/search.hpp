@@ -10,8 +10,9 @@
 
 #include "xcalib/camera.hpp"
 #include "xcalib/edge_map.hpp"
+#include "xcalib/export.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 // A reference camera to try, and the source cameras to try with it. Source cameras of the same
 // place in two hypotheses have the same focal length, relative to the reference's.

@@ -10,9 +10,10 @@
 #include <utility>
 
 #include "xcalib/camera.hpp"
+#include "xcalib/export.hpp"
 #include "xcalib/image.hpp"
 
-namespace xcalib {
+namespace XCALIB_EXPORT xcalib {
 
 // What a registered pixel is worth: the codes of every mask that leaves this library.
 enum class Validity : std::uint8_t { valid = 0, outside = 1, occluded = 2, no_depth = 3 };

@@ -1,0 +1,4 @@
+// What a public header declares is what a shared library exports: all else is hidden.
+#pragma once
+
+#define XCALIB_EXPORT [[gnu::visibility("default")]]
