@@ -6,6 +6,7 @@
 #include <new>
 #include <vector>
 
+#include "xcalib.h"
 #include "xcalib/register.hpp"
 
 namespace {
@@ -57,6 +58,25 @@ TEST(Registrar, AllocatesNothingOnceTheFirstFrameIsThrough) {
             EXPECT_EQ(allocations, warm)
                 << threads << " threads, occlusion " << static_cast<int>(occlusion);
         }
+}
+
+TEST(CApi, AllocatesNothingOnceTheFirstFrameIsThrough) {
+    const xcalib_camera camera{321, 240, 300, 300, 160, 119.5, 0};
+    const xcalib_rig rig{camera, camera, {1, 0, 0, 0}, {-0.3, 0.01, 0.02}, 0, 0};
+    xcalib_registrar* registrar = nullptr;
+    ASSERT_EQ(xcalib_create(&rig, nullptr, &registrar), XCALIB_OK);
+    std::vector<float> pixels(321 * 240, 8.0f), out(321 * 240), map(2 * 321 * 240);
+    std::vector<std::uint8_t> mask(321 * 240);
+    const xcalib_image image{pixels.data(), 321, 240, 1, XCALIB_F32, 4 * 321};
+    const xcalib_output registered{out.data(), 321, 240, 1, XCALIB_F32, 4 * 321};
+    long before = 0;
+    for (int i = 0; i < 20; ++i) {
+        if (i == 1) before = allocations;
+        ASSERT_EQ(xcalib_register(registrar, &image, &image, &registered, mask.data()), XCALIB_OK);
+        ASSERT_EQ(xcalib_map(registrar, &image, map.data()), XCALIB_OK);
+    }
+    EXPECT_EQ(allocations, before);
+    xcalib_destroy(registrar);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "refusal.hpp"
 #include "scenes.hpp"
 #include "xcalib/rig_file.hpp"
+#include "xcalib_rig_file.h"
 
 namespace xcalib {
 namespace {
@@ -264,6 +265,41 @@ TEST_F(RigFile, RelativeDepthIsKeptWhereThereIsOne) {
     EXPECT_TRUE(has(message, "relative_depth: scale = 0, expected a finite number > 0")) << message;
     write_with("format", "relative_depth: {scale: 1}\nformat");
     EXPECT_TRUE(has(refusal([&] { load_rig(path_); }), "missing field 'shift' in relative_depth"));
+}
+
+TEST_F(RigFile, ReadsTheSameInC) {
+    write_with("format", "format");
+    xcalib_rig rig{};
+    ASSERT_EQ(xcalib_load_rig(path_.c_str(), &rig), XCALIB_OK) << xcalib_last_error();
+    const auto camera = [](const xcalib_camera& c) {
+        return Pinhole{c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.skew};
+    };
+    const double *q = rig.quaternion_wxyz, *t = rig.translation_m;
+    const Rig in_c{camera(rig.reference),
+                   camera(rig.source),
+                   {Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d(t[0], t[1], t[2])}};
+    expect_identical(in_c, load_rig(path_));
+    EXPECT_EQ(rig.relative_depth_scale, 0);
+    EXPECT_EQ(rig.relative_depth_shift, 0);
+    write_with("format", "relative_depth: {scale: 0.25, shift: -0.5}\nformat");
+    ASSERT_EQ(xcalib_load_rig(path_.c_str(), &rig), XCALIB_OK);
+    EXPECT_EQ(rig.relative_depth_scale, 0.25);
+    EXPECT_EQ(rig.relative_depth_shift, -0.5);
+}
+
+TEST_F(RigFile, WhatFailsInCHasAStatusAndAText) {
+    xcalib_rig rig{};
+    rig.source.width = 5;
+    EXPECT_EQ(xcalib_load_rig((path_ + ".none").c_str(), &rig), XCALIB_SYSTEM_ERROR);
+    EXPECT_TRUE(has(xcalib_last_error(), path_ + ".none"));
+    write_with("fx: 600", "fx: -600");
+    EXPECT_EQ(xcalib_load_rig(path_.c_str(), &rig), XCALIB_INVALID_ARGUMENT);
+    EXPECT_TRUE(has(xcalib_last_error(), "fx = -600"));
+    EXPECT_EQ(xcalib_load_rig(nullptr, &rig), XCALIB_INVALID_ARGUMENT);
+    EXPECT_STREQ(xcalib_last_error(), "path is NULL");
+    EXPECT_EQ(xcalib_load_rig(path_.c_str(), nullptr), XCALIB_INVALID_ARGUMENT);
+    EXPECT_STREQ(xcalib_last_error(), "rig is NULL");
+    EXPECT_EQ(rig.source.width, 5) << "left as it was";
 }
 
 }  // namespace
