@@ -1,10 +1,10 @@
 // What the source camera cannot see, against rays cast through a scene of boards before a wall.
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include <cmath>
 #include <vector>
 
+#include "every_target.hpp"
 #include "refusal.hpp"
 #include "register_rows.hpp"
 #include "scenes.hpp"
@@ -198,19 +198,13 @@ TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
         EXPECT_EQ(out.mask, expected.mask) << threads << " threads";
         EXPECT_EQ(out.image, expected.image) << threads << " threads";
     }
-    for (std::int64_t targets = hwy::SupportedTargets() & HWY_TARGETS; targets != 0;
-         targets &= targets - 1) {
-        const std::int64_t target = targets & -targets;
-        hwy::SetSupportedTargetsForTest(target);
-        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    on_every_target([&] {
         const Registered out = registered(rig, source, scene.depth, {1, false, Occlusion::hide, 0});
         // How many pixels are splat at once depends on the vector's length.
         int differ = 0;
         for (std::size_t i = 0; i < out.mask.size(); ++i) differ += out.mask[i] != expected.mask[i];
-        EXPECT_LT(differ, kWidth * kHeight / 1000) << hwy::TargetName(target);
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+        EXPECT_LT(differ, kWidth * kHeight / 1000);
+    });
 }
 
 TEST(Occlusion, GapsBetweenTheCellsOfASurfaceAreFilled) {

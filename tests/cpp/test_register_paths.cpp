@@ -1,7 +1,6 @@
 // The registrar's kernel on every instruction set that this machine has, against the equation in
 // double.
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -10,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "every_target.hpp"
 #include "scenes.hpp"
 #include "xcalib/register.hpp"
 
@@ -17,24 +17,6 @@ namespace xcalib {
 namespace {
 
 using namespace ::xcalib::testing;  // NOLINT: scenes.hpp
-
-// Calls `work` once for each instruction set, and leaves the choice as it was.
-template <class Work>
-void on_every_target(const Work& work) {
-    int count = 0;
-    for (std::int64_t targets = hwy::SupportedTargets() & HWY_TARGETS; targets != 0;
-         targets &= targets - 1) {
-        const std::int64_t target = targets & -targets;
-        hwy::SetSupportedTargetsForTest(target);
-        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-        SCOPED_TRACE(hwy::TargetName(target));
-        work();
-        ++count;
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    EXPECT_GE(count, 2) << "the baseline and at least one more";
-}
 
 template <class T>
 PixelType type_of() {
