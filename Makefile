@@ -14,15 +14,18 @@ WERROR := $(if $(CI),ON,OFF)
 
 BUILD_PACKAGES := cmake g++ libceres-dev libeigen3-dev libhwy-dev libopencv-dev libyaml-cpp-dev make \
     ninja-build python3-dev python3-venv
-TEST_PACKAGES := clang-format libgtest-dev
+TEST_PACKAGES := clang-format libgtest-dev pkg-config
 BENCH_PACKAGES := libbenchmark-dev
+# The cross compiler's own libraries, and an emulator: no foreign architecture is added to dpkg.
+AARCH64_PACKAGES := cmake g++-aarch64-linux-gnu googletest libeigen3-dev libhwy-dev ninja-build pkg-config \
+    qemu-user
 
-CPP_FILES = $(shell find bench/cpp cpp tests/cpp -name '*.cpp' -o -name '*.hpp')
+CPP_FILES = $(shell find bench/cpp cpp examples tests -name '*.[ch]' -o -name '*.[ch]pp')
 # What the wheel is made of: it is built again when one of these changes.
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
     $(shell find cpp python -type f -not -path '*/__pycache__/*')
 
-.PHONY: help demo test lint test-cpp test-sdist test-python sanitize format stub clean
+.PHONY: help demo test lint test-cpp test-sdist test-python test-aarch64 sanitize packages format stub clean
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
 
@@ -82,16 +85,30 @@ lint: $(VENV)/.installed $(VENV)/.test-requires | test-packages ## formatting, l
 	$(BIN)/ruff check
 	$(BIN)/mypy
 
-test-cpp: | test-packages ## C++ tests
-	cmake -S . -B build/tests -G Ninja -DXCALIB_TESTS=ON -DXCALIB_WERROR=$(WERROR)
-	cmake --build build/tests
-	ctest --test-dir build/tests --output-on-failure
+# $(call preset,name): configures, builds and tests one of CMakePresets.json.
+define preset
+cmake --preset $(1) -DXCALIB_WERROR=$(WERROR)
+cmake --build --preset $(1)
+ctest --preset $(1)
+endef
+
+test-cpp: | test-packages ## C++ tests, and the installed libraries used by others' projects
+	$(call preset,release)
+	$(call preset,embedded)
 
 sanitize: | test-packages ## C++ tests under the address and undefined-behaviour sanitizers
-	cmake -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DXCALIB_TESTS=ON \
-	    -DXCALIB_SANITIZE=ON -DXCALIB_WERROR=$(WERROR)
-	cmake --build build/sanitize
-	ctest --test-dir build/sanitize --output-on-failure
+	$(call preset,sanitize)
+
+.PHONY: aarch64-packages
+aarch64-packages:
+	@scripts/install_packages.sh $(AARCH64_PACKAGES)
+test-aarch64: | aarch64-packages ## the registrar for 64-bit ARM, its tests under an emulator
+	$(call preset,aarch64)
+
+packages: | build-packages ## Debian packages, into build/packages
+	cmake --preset packages
+	cmake --build --preset packages
+	cd build/packages && cpack
 
 test-sdist: build/sdist/.tested ## an sdist builds, and installs from source
 build/sdist/.tested: $(WHEEL_FILES) $(VENV)/.test-requires | $(VENV)/.installed

@@ -10,7 +10,7 @@ using ::xcalib::testing::has;
 using ::xcalib::testing::refusal;
 
 TEST(FrameBenchmark, EveryStreamRunsAndItsTimesAreInOrder) {
-    for (const FrameBenchmark& benchmark : frame_benchmarks(benchmark_rig(97, 64, 40, 32), 50)) {
+    for (const FrameBenchmark& benchmark : frame_benchmarks(benchmark_rig(97, 64, 40, 32), 10)) {
         const FrameBenchmarkResult result = run_frame_benchmark(benchmark);
         EXPECT_GT(result.median_ms, 0);
         EXPECT_LE(result.median_ms, result.p99_ms);
@@ -30,10 +30,10 @@ TEST(FrameBenchmark, TellsHowManyThreadsAllAre) {
 }
 
 TEST(FrameBenchmark, CountsTheMemoryOfTheOcclusionTest) {
-    FrameBenchmark benchmark{benchmark_rig(1280, 960, 1280, 960)};
+    FrameBenchmark benchmark{benchmark_rig(640, 480, 640, 480)};
     benchmark.frames = benchmark.num_threads = 1;
     // Two tables of a cell of two bytes for each pixel.
-    EXPECT_GT(run_frame_benchmark(benchmark).resident_kib, 2 * 2 * 1000);
+    EXPECT_GT(run_frame_benchmark(benchmark).resident_kib, 2 * 2 * 300);
 }
 
 TEST(FrameBenchmark, RefusesWhatCannotRun) {

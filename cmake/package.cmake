@@ -1,0 +1,41 @@
+# Debian packages, one a component: `cpack` in a build with shared libraries.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME xcalib)
+set(CPACK_PACKAGE_CONTACT "XCalib contributors")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Registers thermal images to visible ones through depth")
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)  # and run ldconfig
+set(CPACK_DEBIAN_ENABLE_COMPONENT_DEPENDS ON)
+# The libraries link each other, and are not installed yet.
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR})
+
+# xcalib_package(component name section DEPENDS component...)
+function(xcalib_package component name section)
+  cmake_parse_arguments(PARSE_ARGV 3 arg "" "" "DEPENDS")
+  string(TOUPPER ${component} upper)
+  set(CPACK_COMPONENTS_ALL ${CPACK_COMPONENTS_ALL} ${component} PARENT_SCOPE)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${name} PARENT_SCOPE)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section} PARENT_SCOPE)
+  set(CPACK_COMPONENT_${upper}_DEPENDS ${arg_DEPENDS} PARENT_SCOPE)
+  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} RENAME copyright
+    COMPONENT ${component})
+endfunction()
+
+set(CPACK_COMPONENTS_ALL)
+set(libraries)
+foreach(library IN ITEMS register rig_file core)
+  if(TARGET xcalib_${library})
+    string(REPLACE _ - name libxcalib-${library})
+    xcalib_package(${library} ${name} libs DEPENDS ${libraries})
+    list(APPEND libraries ${library})
+  endif()
+endforeach()
+xcalib_package(development libxcalib-dev libdevel DEPENDS ${libraries})
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS libeigen3-dev)  # for C++
+if(TARGET xcalib-cli)
+  xcalib_package(cli xcalib-cli science DEPENDS ${libraries})
+endif()
+include(CPack)
