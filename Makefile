@@ -23,7 +23,7 @@ AARCH64_PACKAGES := cmake g++-aarch64-linux-gnu googletest libeigen3-dev libhwy-
 CPP_FILES = $(shell find bench/cpp cpp examples tests -name '*.[ch]' -o -name '*.[ch]pp')
 # What the wheel is made of: it is built again when one of these changes.
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
-    $(shell find cpp python -type f -not -path '*/__pycache__/*')
+    $(shell find cmake cpp python -type f -not -path '*/__pycache__/*')
 
 .PHONY: help demo test lint test-cpp test-sdist test-python test-aarch64 sanitize packages format stub clean
 help:
