@@ -11,12 +11,10 @@ install(FILES ${PROJECT_BINARY_DIR}/xcalibConfig.cmake
 
 file(RELATIVE_PATH to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 string(REGEX REPLACE "/$" "" to_prefix ${to_prefix})
-# xcalib_export(name description REQUIRES pc... LIBRARIES -l...): the latter are what a static library
-# leaves to be linked.
-function(xcalib_export name description)
+# xcalib_pkgconfig(name description REQUIRES pc... LIBRARIES -l...): the latter are what a static
+# library leaves to be linked.
+function(xcalib_pkgconfig name description)
   cmake_parse_arguments(PARSE_ARGV 2 arg "" "" "REQUIRES;LIBRARIES")
-  install(EXPORT xcalib_${name} NAMESPACE xcalib:: DESTINATION ${to} COMPONENT development
-    FILE xcalib_${name}.cmake)
   list(JOIN arg_REQUIRES " " requires)
   set(libraries "")
   if(NOT BUILD_SHARED_LIBS)
@@ -27,17 +25,22 @@ function(xcalib_export name description)
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 endfunction()
 
+foreach(name IN ITEMS register rig_file core)
+  if(TARGET xcalib_${name})
+    install(EXPORT xcalib_${name} NAMESPACE xcalib:: DESTINATION ${to} COMPONENT development
+      FILE xcalib_${name}.cmake)
+  endif()
+endforeach()
 set(hwy_library -lhwy)
 if(TARGET xcalib_highway)
   set(hwy_library)
 endif()
-xcalib_export(register "Registers thermal images to visible ones through depth, frame by frame"
+xcalib_pkgconfig(register "Registers thermal images to visible ones through depth, frame by frame"
   LIBRARIES ${hwy_library} -pthread -lstdc++ -lm)
 if(TARGET xcalib_rig_file)
-  xcalib_export(rig_file "Rig files of XCalib" REQUIRES xcalib_register LIBRARIES -lyaml-cpp)
+  xcalib_pkgconfig(rig_file "Rig files of XCalib" REQUIRES xcalib_register LIBRARIES -lyaml-cpp)
 endif()
-if(TARGET xcalib_core)
-  # Ceres has no pkg-config file that a static library could ask for what it needs.
-  xcalib_export(core "Calibrates thermal-visible camera rigs" REQUIRES xcalib_rig_file
-    LIBRARIES -lceres -lglog -lopencv_imgproc -lopencv_core)
+if(TARGET xcalib_core AND BUILD_SHARED_LIBS)
+  # Of what a static Ceres needs in turn, only CMake is told.
+  xcalib_pkgconfig(core "Calibrates thermal-visible camera rigs" REQUIRES xcalib_rig_file eigen3)
 endif()

@@ -15,8 +15,9 @@ function(installed_project name folder)
 endfunction()
 
 installed_project(install_examples ${PROJECT_SOURCE_DIR}/examples)
+installed_project(install_c ${PROJECT_SOURCE_DIR}/tests/install/c)
 if(TARGET xcalib::core)
-  installed_project(install_core ${PROJECT_SOURCE_DIR}/tests/install)
+  installed_project(install_core ${PROJECT_SOURCE_DIR}/tests/install/core)
 endif()
 
 enable_language(C)
