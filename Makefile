@@ -27,7 +27,7 @@ WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/READM
 
 .PHONY: help demo test lint test-cpp test-sdist test-python test-aarch64 sanitize packages format stub clean
 help:
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
+	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
 
 demo: $(VENV)/.installed ## render a rig, calibrate it, register it: pictures in build/demo
 	$(BIN)/xcalib demo -o build/demo
@@ -106,6 +106,7 @@ test-aarch64: | aarch64-packages ## the registrar for 64-bit ARM, its tests unde
 	$(call preset,aarch64)
 
 packages: | build-packages ## Debian packages, into build/packages
+	@scripts/install_packages.sh dpkg-dev
 	cmake --preset packages
 	cmake --build --preset packages
 	cd build/packages && cpack
