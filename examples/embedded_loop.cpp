@@ -17,6 +17,7 @@
 #include <xcalib/register.hpp>
 
 using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
 using xcalib::Image;
 using xcalib::PixelType;
 
@@ -100,14 +101,12 @@ int main(int argc, char** argv) {
                     {}};
     rig.source_from_reference.translation = {-0.2, 0, 0};
     const xcalib::Registrar registrar(rig, {1});  // one thread: the others have their own work
-
     Exchange<Thermal> thermal{Thermal(kSourceWidth * kSourceHeight)};
     Exchange<Image> depth{Image(kWidth, kHeight)};
     const auto start = Clock::now();
     std::thread camera([&] {
         for (long i = 0; i < frames; ++i) {
-            if (rate > 0)
-                std::this_thread::sleep_until(start + std::chrono::duration<double>(i / rate));
+            if (rate > 0) std::this_thread::sleep_until(start + Seconds(i / rate));
             thermal.write([&](Thermal& image) { capture(rig, i, image); });
         }
     });
@@ -131,8 +130,7 @@ int main(int argc, char** argv) {
                     metres.view(),
                     {registered.data(), kWidth, kHeight, 1, PixelType::u16, 2 * kWidth},
                     mask.data());
-                const std::chrono::duration<double, std::milli> took = Clock::now() - before;
-                milliseconds.push_back(took.count());
+                milliseconds.push_back(1e3 * Seconds(Clock::now() - before).count());
                 for (std::size_t k = 0; k < mask.size(); ++k)
                     if (metres.pixels[k] == kBoard && mask[k] == 0) {
                         ++on_board;
@@ -142,7 +140,6 @@ int main(int argc, char** argv) {
         });
     camera.join();
     sensor.join();
-
     if (frames < 1 || on_board == 0) return EXIT_FAILURE;
     std::sort(milliseconds.begin(), milliseconds.end());
     std::printf("%ld frames: median %.2f ms, worst %.2f ms; %.1f %% of the board is warm\n", frames,

@@ -69,7 +69,9 @@ struct Registrar::Stream {
         : grid(rig), parts(std::min(resolve_threads(options.num_threads), kMostParts)),
           // Cameras at one place see the same.
           occlusion(options.occlusion != Occlusion::ignore && rig.t().norm() > 0),
-          workers(resolve_threads(options.num_threads)) {}
+          workers(resolve_threads(options.num_threads)) {
+        if (occlusion) give_back(take());  // for the first frame
+    }
 
     std::unique_ptr<Cells> take() {
         {
