@@ -11,8 +11,14 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Warnings are errors in CI only.
 WERROR := $(if $(CI),ON,OFF)
+# The same sources are compiled for the wheel, the C++ tests and from the sdist: once, where paths are
+# taken relative to each.
+export CMAKE_CXX_COMPILER_LAUNCHER := ccache
+export CCACHE_BASEDIR := $(CURDIR)
+export CCACHE_NOHASHDIR := 1
+export CXX
 
-BUILD_PACKAGES := cmake g++ libceres-dev libeigen3-dev libhwy-dev libopencv-dev libyaml-cpp-dev make \
+BUILD_PACKAGES := ccache cmake g++ libceres-dev libeigen3-dev libhwy-dev libopencv-dev libyaml-cpp-dev make \
     ninja-build python3-dev python3-venv
 TEST_PACKAGES := clang-format libgtest-dev pkg-config
 BENCH_PACKAGES := libbenchmark-dev
@@ -116,14 +122,17 @@ build/sdist/.tested: $(WHEEL_FILES) $(VENV)/.test-requires | $(VENV)/.installed
 	rm -rf build/sdist
 	$(BIN)/python -m build --sdist --no-isolation --outdir build/sdist .
 	! tar -tf build/sdist/*.tar.gz | grep -E '/(\.venv|build|__pycache__|\.[a-z]+_cache)/'
-	$(PIP) install -q --no-build-isolation --no-deps --target build/sdist/site build/sdist/*.tar.gz
+	tar -xf build/sdist/*.tar.gz -C build/sdist
+	CCACHE_BASEDIR=$$(echo $(CURDIR)/build/sdist/xcalib*[0-9]) $(PIP) install -q --no-build-isolation --no-deps \
+	    --config-settings=build-dir=build/wheel --config-settings=cmake.define.XCALIB_WERROR=$(WERROR) \
+	    --target build/sdist/site build/sdist/xcalib*[0-9]/
 	cd build/sdist/site && ../../../$(BIN)/python -c \
 	    'import pathlib, xcalib; assert pathlib.Path(xcalib.__file__).is_relative_to(pathlib.Path.cwd())'
 	touch $@
 
 # From the tests' folder: the package they import is the installed one.
 test-python: $(VENV)/.installed $(VENV)/.test-requires ## Python tests, on the installed package
-	cd tests && ../$(BIN)/python -m pytest
+	cd tests && ../$(BIN)/python -m pytest -n auto --dist loadfile
 
 # -- Figures --------------------------------------------------------------------------------------
 
