@@ -15,7 +15,8 @@ from figures import figure, spread
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
-from xcalib.depth.completion import complete, compressed, conductance
+from xcalib._core import complete_depth as complete
+from xcalib._core import compressed_guide
 from xcalib.depth.lidar import project, read_lidar_calibration, read_points, without_hidden
 from xcalib.frames import size_of
 
@@ -33,12 +34,18 @@ def nearest(depth: Array, guide: Array) -> Array:
     return values[labels]
 
 
+def conductance(guide: Array) -> tuple[Array, Array]:
+    """The core's: weights of each pixel's bond to its right (h, w-1) and lower (h-1, w)."""
+    right, down = np.diff(guide, axis=1), np.diff(guide, axis=0)
+    return 1 / (1 + (right / 0.1) ** 2), 1 / (1 + (down / 0.1) ** 2)
+
+
 def nearest_colour(depth: Array, guide: Array) -> Array:
     """Known pixels 0 to 32 px away in 8 directions, weighted by distance and gray."""
     known = depth > 0
     inverse = np.where(known, 1 / np.where(known, depth, 1), 0).astype(np.float32)
     total, mass = np.zeros_like(inverse), np.full_like(inverse, 1e-12)
-    shades = compressed(guide, size_of(depth))
+    shades = compressed_guide(guide, *size_of(depth))
     for reach in (0, 2, 4, 8, 16, 32):
         for dy, dx in ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (-1, -1), (1, -1), (-1, 1)):
             move = np.float32([[1, 0, dx * reach], [0, 1, dy * reach]])
@@ -58,7 +65,7 @@ def global_smoother(depth: Array, guide: Array) -> Array:
     """Weighted least squares by separable tridiagonal solves, 3 sweeps."""
     known = (depth > 0).astype(np.float32)
     inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float32)
-    right, down = conductance(compressed(guide, size_of(depth)))
+    right, down = conductance(compressed_guide(guide, *size_of(depth)))
     u = np.stack([inverse, known, 1e-6 * np.ones_like(known)])
     for sweep in range(3):
         strength = 1.5 * 100 * 4 ** (2 - sweep) / (4**3 - 1)
@@ -87,7 +94,7 @@ def tridiagonal(f: Array, w: Array) -> Array:
 def diffusion(depth: Array, guide: Array) -> Array:
     """Anisotropic diffusion to its end: conjugate gradients, from the nearest."""
     h, w = depth.shape
-    right, down = conductance(compressed(guide, size_of(depth)))
+    right, down = conductance(compressed_guide(guide, *size_of(depth)))
     r = np.pad(right, ((0, 0), (0, 1))).ravel()[:-1].astype(float)  # none across the rows' ends
     d = down.ravel().astype(float)
     laplace = sparse.diags([-d, -r, -r, -d], [-w, -1, 1, w], format="csr")

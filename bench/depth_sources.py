@@ -13,9 +13,9 @@ from figures import figure
 from night import NightRig, gains, patches
 
 import xcalib
+from xcalib._core import fit_plane, frames_to_judge_plane
 from xcalib.depth import PlaneDepth
 from xcalib.depth.completion import MIN_CONFIDENCE, complete
-from xcalib.depth.plane_fit import fit_plane, spread
 
 
 def main() -> None:
@@ -33,7 +33,10 @@ def main() -> None:
         return np.where(confidence >= MIN_CONFIDENCE, dense, 0).astype(np.float32)
 
     start = time.perf_counter()
-    rig, some = night.fit(of_plane(plane)).rig, spread(night.fitted)
+    rig, some = (
+        night.fit(of_plane(plane)).rig,
+        [night.fitted[i] for i in frames_to_judge_plane(len(night.fitted))],
+    )
     images = [night.visible(n) for n in some], [night.thermal(n) for n in some]
     found = fit_plane(*images, plane, rig, xcalib.CalibrationOptions())
     print(f"plane refined: horizon {found.horizon:g}, roll {found.roll_deg:g} deg", end=", ")

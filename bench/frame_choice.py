@@ -15,7 +15,8 @@ from common import data, machine
 from figures import figure
 
 import xcalib
-from xcalib.choose import choose_informed, draw_frames
+from xcalib._core import choose_frames as draw_frames
+from xcalib.choose import choose_informed
 from xcalib.depth import FolderDepth
 from xcalib.evaluate import evaluate
 from xcalib.footage import ImageFiles
@@ -46,7 +47,7 @@ def main() -> None:
     def judged(frames: tuple[int, ...]) -> tuple[float, float, bool]:
         result = xcalib.calibrate(*zip(*map(read, frames), strict=True))
         scores = evaluate(result.rig, *zip(*map(read, held), strict=True)).registered
-        return scores.patch_median, scores.patch_under_2px, result.converged
+        return scores["patch_median"], scores["patch_under_2px"], result.converged
 
     for chosen in args.chosen:
         found: dict[str, list[tuple[int, ...]]] = {"spread": [], "informed": []}

@@ -184,10 +184,10 @@ def test_evaluate_by_hand() -> None:
     result = evaluate(rig, [reference], [source], [depth])
     assert result.size == (160, 120)
     assert result.valid_share == pytest.approx((160 - 7) / 160, abs=0.03)
-    assert result.registered.rmse == pytest.approx(0, abs=1e-4)
-    assert result.registered.ncc == pytest.approx(1, abs=1e-4)
-    assert result.unregistered.ncc < 0.5
-    assert result.gain("rmse") == pytest.approx(-100, abs=1)
+    assert result.registered["rmse"] == pytest.approx(0, abs=1e-4)
+    assert result.registered["ncc"] == pytest.approx(1, abs=1e-4)
+    assert result.unregistered["ncc"] < 0.5
+    assert result.gain_percent["rmse"] == pytest.approx(-100, abs=1)
     # At half the size the shift is no whole number of pixels any more.
     assert evaluate(rig, [reference], [source], [depth], width=80).size == (80, 60)
 

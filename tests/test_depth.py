@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from xcalib import CalibrationOptions, calibrate, synthetic
+from xcalib._core import fit_plane
 from xcalib.depth import PlaneDepth, open_depth, read_depth
-from xcalib.depth.plane_fit import fit_plane
 from xcalib.frames import Image, InputError, write_image
 
 REFERENCE = np.zeros((480, 640), np.uint8)

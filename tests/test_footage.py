@@ -616,7 +616,7 @@ def test_depth_of_the_frames_in_use(tmp_path: Path) -> None:
 
     def found(*names: str) -> list[int]:
         depths = [Path("depth") / f"{name}.npy" for name in names]
-        return match_depths(stream, used, depths, Path("depth"))
+        return match_depths(stream, used, depths)
 
     assert found("000000", "000001", "000003") == [1, 2]  # by name, one is left over
     assert found("d0", "d1", "d2", "d3") == [1, 3]  # by number, of all frames

@@ -235,7 +235,7 @@ def test_aspect_may_be_off_by_rounding_only() -> None:
 
 def test_rig_is_fitted_to_the_images_or_refused() -> None:
     rig = Rig(Pinhole.from_hfov(640, 480, 60), Pinhole.from_hfov(320, 256, 50))
-    assert fit_rig(rig, (640, 480), (320, 256)) is rig
+    assert repr(fit_rig(rig, (640, 480), (320, 256))) == repr(rig)
     half = fit_rig(rig, (320, 240), (320, 256))
     assert (half.reference.width, half.reference.height) == (320, 240)
     assert half.reference.fx == pytest.approx(rig.reference.fx / 2)

@@ -1,4 +1,6 @@
 // The Python module: it converts and calls, nothing else.
+#include "bindings.hpp"
+
 #include <pybind11/eigen.h>
 #include <pybind11/functional.h>
 #include <pybind11/numpy.h>
@@ -10,7 +12,9 @@
 #include <cmath>
 #include <system_error>
 
+#include "arrays.hpp"
 #include "xcalib/calibrate.hpp"
+#include "xcalib/error.hpp"
 #include "xcalib/flow.hpp"
 #include "xcalib/gray.hpp"
 #include "xcalib/metrics.hpp"
@@ -24,63 +28,6 @@ using namespace xcalib;
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
-
-std::string shape_text(const py::array& array) {
-    std::string text = "shape (";
-    for (py::ssize_t i = 0; i < array.ndim(); ++i)
-        text += (i ? ", " : "") + std::to_string(array.shape(i));
-    return text + ") " + std::string(py::str(array.dtype()));
-}
-
-constexpr int kAligned = py::detail::npy_api::NPY_ARRAY_ALIGNED_;
-
-// A view on a numpy array, and the array that owns it (a copy where rows are not contiguous or
-// numbers not aligned).
-struct Held {
-    py::array array;
-    ImageView view;
-};
-
-Held image_of(const std::string& name, const py::object& object) {
-    const py::array given = py::array::ensure(object);
-    if (!given) throw py::value_error(name + " is not a numpy array");
-    PixelType type;
-    if (py::isinstance<py::array_t<std::uint8_t>>(given)) type = PixelType::u8;
-    else if (py::isinstance<py::array_t<std::uint16_t>>(given)) type = PixelType::u16;
-    else if (py::isinstance<py::array_t<float>>(given)) type = PixelType::f32;
-    else
-        throw py::value_error(name + " has " + shape_text(given) +
-                              ", expected dtype uint8, uint16 or float32");
-    const bool gray = given.ndim() == 2 || (given.ndim() == 3 && given.shape(2) == 1);
-    if (!gray && !(given.ndim() == 3 && given.shape(2) == 3))
-        throw py::value_error(name + " has " + shape_text(given) +
-                              ", expected shape (H, W) or (H, W, 3)");
-    if (given.size() == 0) throw py::value_error(name + " has " + shape_text(given) + ", is empty");
-    Held held;
-    held.array = py::array::ensure(given, py::array::c_style | kAligned);
-    held.view = {
-        held.array.data(),
-        static_cast<int>(held.array.shape(1)),
-        static_cast<int>(held.array.shape(0)),
-        gray ? 1 : 3,
-        type,
-        static_cast<std::ptrdiff_t>(held.array.shape(1) * (gray ? 1 : 3) * held.array.itemsize())};
-    return held;
-}
-
-// Depth in metres: float32; float64 is converted. Integers are refused, they carry no unit, unless
-// the unit of uint16 is known.
-Held depth_of(const std::string& name, const py::object& object, bool unit_known = false) {
-    py::array given = py::array::ensure(object);
-    if (!given) throw py::value_error(name + " is not a numpy array");
-    if (py::isinstance<py::array_t<double>>(given)) given = py::array_t<float>::ensure(given);
-    const bool is_depth = py::isinstance<py::array_t<float>>(given) ||
-                          (unit_known && py::isinstance<py::array_t<std::uint16_t>>(given));
-    if (!is_depth || given.ndim() != 2 || given.size() == 0)
-        throw py::value_error(name + " has " + shape_text(given) +
-                              ", expected shape (h, w) float32 in metres");
-    return image_of(name, given);
-}
 
 // The caller's array to write to, which shares nothing with `others`, or a new one.
 py::array result_of(const char* name, const py::object& object, const py::dtype& dtype,
@@ -105,22 +52,6 @@ py::array result_of(const char* name, const py::object& object, const py::dtype&
             throw py::value_error(std::string(name) + " overlaps " + other +
                                   ", expected memory of its own");
     return given;
-}
-
-struct HeldList {
-    std::vector<Held> held;
-    std::vector<ImageView> views;
-};
-
-template <class Convert>
-HeldList list_of(const char* name, const py::sequence& sequence, const Convert& convert) {
-    HeldList list;
-    for (std::size_t i = 0; i < sequence.size(); ++i) {
-        list.held.push_back(
-            convert(std::string(name) + " frame " + std::to_string(i), sequence[i]));
-        list.views.push_back(list.held.back().view);
-    }
-    return list;
 }
 
 Image gray_of(const char* name, const py::object& object) {
@@ -340,6 +271,8 @@ PYBIND11_MODULE(_core, m) {
         }
     });
 
+    py::register_exception<InputError>(m, "InputError", PyExc_ValueError);
+
     py::class_<Pinhole>(m, "Pinhole", R"(A pinhole camera, Eq. (intrinsic) of the paper.
 
 Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.)")
@@ -432,6 +365,10 @@ A rig that was calibrated with it has its translation in the unit that the scale
         .def("resized", &Rig::resized, py::arg("reference_width"), py::arg("reference_height"),
              py::arg("source_width"), py::arg("source_height"),
              "The same rig behind images of other sizes [px].")
+        .def("fitted", &fitted, py::arg("reference_width"), py::arg("reference_height"),
+             py::arg("source_width"), py::arg("source_height"),
+             "The rig for images of these sizes [px]: itself, or resized where both have its "
+             "aspects, to within a pixel. Raises InputError where one has not.")
         .def(
             "save",
             [](const Rig& rig, const std::filesystem::path& path) { save_rig(rig, path.string()); },
@@ -844,4 +781,7 @@ Returns (flow, confidence): flow (H, W, 2) float32 [px], what reference pixel p 
 p + flow[p] in the warped source; confidence (H, W) float32 in [0, 1]. Both are linear between the
 grid's points. num_threads: 0 uses every core; the result does not depend on it.
 Raises ValueError with shapes and dtypes.)");
+
+    bind_footage(m);
+    bind_evaluation(m);
 }

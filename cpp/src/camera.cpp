@@ -1,8 +1,13 @@
 #include "xcalib/camera.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <sstream>
 #include <stdexcept>
+
+#include "format.hpp"
+#include "xcalib/error.hpp"
 
 namespace xcalib {
 namespace {
@@ -131,6 +136,24 @@ void Rig::validate() const {
         require(std::isfinite(t()[i]), "source_from_reference", "translation", t()[i],
                 "a finite number of metres");
     if (relative_depth) relative_depth->validate("relative_depth");
+}
+
+Rig fitted(const Rig& rig, int reference_width, int reference_height, int source_width,
+           int source_height) {
+    const auto same = [](const char* name, const Pinhole& camera, int width, int height) {
+        const long difference = std::labs(static_cast<long>(width) * camera.height -
+                                          static_cast<long>(height) * camera.width);
+        if (difference > std::max(camera.width, camera.height))
+            throw InputError(
+                format("%s images are %dx%d, but the rig's %s camera is %dx%d;"
+                       " expected that size or the same aspect",
+                       name, width, height, name, camera.width, camera.height));
+        return camera.width == width && camera.height == height;
+    };
+    const bool reference = same("reference", rig.reference, reference_width, reference_height);
+    const bool source = same("source", rig.source, source_width, source_height);
+    if (reference && source) return rig;
+    return rig.resized(reference_width, reference_height, source_width, source_height);
 }
 
 Eigen::Vector3d unproject(const Pinhole& camera, double u, double v, double z) {

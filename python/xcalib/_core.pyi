@@ -2,8 +2,10 @@ from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any
 
-from numpy import float32, float64, uint8
+from numpy import float32, float64, intp, uint8
 from numpy.typing import ArrayLike, NDArray
+
+class InputError(ValueError): ...
 
 class Pinhole:
     """A pinhole camera, Eq. (intrinsic) of the paper.
@@ -110,6 +112,12 @@ class Rig:
     def load(path: str | PathLike[str]) -> Rig:
         """Reads a rig file. OSError where it cannot be read; ValueError, with the path, the
         field and what was expected, where it is not a rig.
+        """
+    def fitted(
+        self, reference_width: int, reference_height: int, source_width: int, source_height: int
+    ) -> Rig:
+        """The rig for images of these sizes [px]: itself, or resized where both have its
+        aspects, to within a pixel. Raises InputError where one has not.
         """
 
 class SearchOptions:
@@ -507,4 +515,341 @@ def patch_flow(
     shows is found at p + flow[p] in the warped source; confidence (H, W) float32 in [0, 1].
     Both are linear between the grid's points. num_threads: 0 uses every core; the result does
     not depend on it. Raises ValueError with shapes and dtypes.
+    """
+
+def natural_order(names: Sequence[str]) -> list[int]:
+    """Indices of names in the order in which people count: runs of digits compare as numbers,
+    letters of ASCII without their case.
+    """
+
+def pair_files(
+    first: Sequence[str | PathLike[str]], second: Sequence[str | PathLike[str]]
+) -> list[int]:
+    """The partner in second of each file of first, as indices; neither may be empty.
+
+    Files of the same stem belong together; if none is common, those with the same numbers in
+    their names; if none is common either, their order decides. Raises InputError, naming what
+    has no partner, where names agree only in part or the counts differ.
+    """
+
+def times_of_names(names: Sequence[str]) -> list[float] | None:
+    """Seconds where every name holds one time since 1970 (19, 16 or 13 digits, or seconds with a
+    fraction) and they rise; None otherwise.
+    """
+
+def times_of_table(text: str, table: str, names: Sequence[str]) -> list[float]:
+    """Seconds of each name, from the text of a table of `name timestamp` lines.
+
+    Names with or without suffix, then a comma, semicolon or blanks; lines of other kinds may
+    only come first, # comments anywhere. Times of 19, 16 or 13 digits are nano-, micro- and
+    milliseconds, others seconds. Raises InputError that begins with table, the file's name.
+    """
+
+def median_period(times: Sequence[float]) -> float:
+    """Median distance of times [s]; 0 for a single one."""
+
+class FrameList:
+    """The frames of a camera, without their pixels."""
+    def __init__(
+        self,
+        names: Sequence[str],
+        where: Sequence[str],
+        paths: Sequence[str | PathLike[str]] = ...,
+        times: Sequence[float] | None = None,
+    ) -> None:
+        """names: without suffix; where: for messages; paths: of image files, none for other
+        frames; times: seconds, never falling, or None.
+        """
+
+class Pairing:
+    """Indices into two streams, and how they were found."""
+    def __init__(
+        self,
+        method: str,
+        references: Sequence[int] | NDArray[intp],
+        sources: Sequence[int] | NDArray[intp],
+    ) -> None: ...
+    @property
+    def method(self) -> str:
+        """name, order or time."""
+    @property
+    def references(self) -> NDArray[intp]:
+        """(N,) indices."""
+    @property
+    def sources(self) -> NDArray[intp]:
+        """(N,) indices."""
+    @property
+    def dropped(self) -> tuple[int, int]:
+        """Frames of either stream without a partner."""
+    @property
+    def gap(self) -> float:
+        """Median distance in time, the offset allowed for [s]."""
+    @property
+    def offset(self) -> float:
+        """By how much the source's clock is late [s]."""
+    def line(self) -> str:
+        """What happened, in one line."""
+
+def pair_times(
+    references: Sequence[float] | NDArray[float64],
+    sources: Sequence[float] | NDArray[float64],
+    offset: float = 0.0,
+    max_gap: float | None = None,
+) -> Pairing:
+    """Pairs nearest times, one to one and in order, at most max_gap apart [s].
+
+    The frames of the stream with fewer of them choose, one after the other, among the frames
+    behind the last one chosen. By default max_gap is half the larger median period. Raises
+    InputError where no two are near.
+    """
+
+def pair_frames(
+    references: FrameList,
+    sources: FrameList,
+    method: str = "auto",
+    offset: float = 0.0,
+    max_gap: float | None = None,
+) -> Pairing:
+    """Pairs two FrameLists.
+
+    method: name (pair_files), order (first with first, of equally many), time (pair_times),
+    or auto: by time where both have times, else files by name, and others in order. offset
+    [s]: reference time t is source time t + offset; not 0: by time. Raises InputError.
+    """
+
+def match_depths(references: FrameList, used: Sequence[int], depths: FrameList) -> list[int]:
+    """The depth map, as an index into depths, of each of the references used.
+
+    Files under the names of the frames are theirs, and others are left over. Else the nearest
+    in time within half a period of the references, where both tell it; else by pair_files, of
+    all references or of those in use. Raises InputError.
+    """
+
+def nearest_depths(
+    references: FrameList, used: Sequence[int], depths: Sequence[float], where: str
+) -> list[int]:
+    """The nearest depth map in time, as match_depths() does it; depths: their times [s]."""
+
+def frames_to_look_at(count: int, max_frames: int, seed: int) -> list[int]:
+    """Indices of the frames, of count, that a choice of max_frames looks at: four of each
+    wanted, drawn with seed; rising.
+    """
+
+class Candidate:
+    """What is kept of one frame, and what became of it."""
+    def __init__(self, index: int, reason: str) -> None:
+        """A frame that cannot be decoded."""
+    @property
+    def index(self) -> int:
+        """Of the frame in the footage."""
+    @property
+    def decoded(self) -> bool:
+        """Whether there were images to look at."""
+    @property
+    def taken(self) -> bool:
+        """Whether it is in the choice."""
+    @property
+    def reason(self) -> str:
+        """Why it was taken or left."""
+    @property
+    def agreement(self) -> float:
+        """Normalized correlation of the two images' edges where the footage as a whole aligns;
+        NaN where not measured.
+        """
+    @property
+    def gain(self) -> float:
+        """What it added, or at the end would have added, to the log-determinant of the
+        information; NaN where not measured.
+        """
+
+def look_at(
+    index: int,
+    reference: NDArray[Any],
+    source: NDArray[Any],
+    depth: NDArray[Any] | None = None,
+) -> Candidate:
+    """The Candidate of a frame; depth (h, w) float32 [m], None leaves it out of the choice."""
+
+class Choice:
+    """The frames to calibrate on, and what was found out on the way."""
+    @property
+    def indices(self) -> list[int]:
+        """Of the frames taken, rising."""
+    @property
+    def candidates(self) -> list[Candidate]:
+        """Every frame looked at, in order."""
+    @property
+    def unusable(self) -> list[Candidate]:
+        """Candidates that something was found against: they never were in the choice."""
+    def table(self, names: Callable[[int], str]) -> str:
+        """One line per candidate: its name, what was measured, why it was taken or left."""
+
+def choose(candidates: Sequence[Candidate], max_frames: int) -> Choice:
+    """The Choice of at most max_frames of the candidates that say most about the rig; without a
+    usable one it is empty.
+    """
+
+class ColorMap:
+    """A curve in the colour cube, from cold to hot."""
+    @property
+    def name(self) -> str:
+        """Of a known map, or `estimated`."""
+    @property
+    def curve(self) -> NDArray[uint8]:
+        """(256, 3) uint8, blue, green, red."""
+    def invert(self, image: NDArray[Any]) -> NDArray[Any]:
+        """The place of each pixel on the curve, 0 to 255: (h, w, 3) to (h, w) uint8. An image of
+        one channel is returned as it is.
+        """
+
+def known_color_maps() -> list[ColorMap]:
+    """OpenCV's, and `iron`."""
+
+def known_color_map(name: str) -> ColorMap:
+    """Raises InputError that lists the names."""
+
+def frames_to_recognise_by(count: int) -> list[int]:
+    """A few of count frames, spread over the footage, rising."""
+
+def recognise(images: Sequence[NDArray[Any]]) -> ColorMap | None:
+    """The ColorMap of false-colour images of one camera, or None if they are none.
+
+    The known map that is nearest, or one named `estimated`, whose bright end counts as hot.
+    Gray images, tinted ones, and photographs give None. A few images are enough, and more
+    than one is better where the map is not a known one.
+    """
+
+class PlaneDepth:
+    """Road-plane prior: a flat road under the camera, all else far away.
+
+    D(x, y) = camera_height * fy / r(x, y), where r is the distance of a pixel below the
+    horizon [px], never beyond far, which is also the depth at and above the horizon.
+    """
+    def __init__(
+        self,
+        camera_height: float = 1.6,
+        horizon: float = 0.5,
+        far: float = 60.0,
+        hfov_deg: float = 45.0,
+        roll_deg: float = 0.0,
+    ) -> None:
+        """Raises InputError: field, value, range."""
+    @property
+    def camera_height(self) -> float:
+        """Of the reference camera above the road [m], > 0."""
+    @property
+    def horizon(self) -> float:
+        """Its row in the middle column, as a fraction of the image height from the top, (-1, 1)."""
+    @property
+    def far(self) -> float:
+        """Largest depth [m], > 0."""
+    @property
+    def hfov_deg(self) -> float:
+        """Of the reference camera [deg], (0, 180); pixels are square."""
+    @property
+    def roll_deg(self) -> float:
+        """How far the horizon falls towards the right [deg], (-45, 45)."""
+    def __call__(self, index: int, reference: NDArray[Any]) -> NDArray[float32]:
+        """Depth of any frame: (H, W) float32 [m], of the reference image's size."""
+
+def frames_to_judge_plane(count: int) -> list[int]:
+    """Of count frames, those that judge a plane: at most a dozen, evenly spread."""
+
+def fit_plane(
+    references: Sequence[NDArray[Any]],
+    sources: Sequence[NDArray[Any]],
+    plane: PlaneDepth,
+    rig: Rig,
+    options: CalibrationOptions,
+    progress: Callable[[], object] | None = None,
+) -> PlaneDepth:
+    """The PlaneDepth near plane whose best rig aligns most edges.
+
+    references, sources: images as calibrate() takes them; a dozen is enough. plane: where to
+    start; its height, far distance and field of view are kept, since height scales depth and
+    translation alike. rig: fitted with plane, where fits start. options: known cameras and
+    threads are kept. progress: is called after each fit.
+    """
+
+def completion_confidence() -> float:
+    """Filled pixels below it stay unknown, unless asked for."""
+
+def complete_depth(
+    depth: NDArray[Any], guide: NDArray[Any]
+) -> tuple[NDArray[float32], NDArray[float32]]:
+    """Fills the unknown pixels of a depth map along image edges; known ones are kept.
+
+    depth (h, w) float32 [m], 0 unknown; guide: the reference image, of the same aspect.
+    Returns (depth, confidence), (h, w) float32 each: depth > 0 everywhere; confidence in [0,
+    1], 1 where depth was known, and lower the farther a pixel is from known depth and the
+    more depth varies around it. An order, not a probability. Raises InputError where nothing
+    is known or the aspects differ.
+    """
+
+def completed(
+    depth: NDArray[Any], guide: NDArray[Any], min_confidence: float = 0.3
+) -> NDArray[float32]:
+    """The depth of complete_depth() where its confidence is at least min_confidence, [0, 1]; 0
+    elsewhere.
+    """
+
+def compressed_guide(guide: NDArray[Any], width: int, height: int) -> NDArray[float32]:
+    """The guide as gray of another size, with the contrast of dark parts raised: (height, width)
+    float32 in [0, 1].
+    """
+
+class Evaluation:
+    """Scores of the registered and the unregistered source."""
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height the images are judged at [px]."""
+    @property
+    def valid_share(self) -> float:
+        """Mean share of the pixels judged, [0, 1]."""
+    @property
+    def registered(self) -> dict[str, float]:
+        """Scores by name, means over the frames; NaN where undefined."""
+    @property
+    def unregistered(self) -> dict[str, float]:
+        """The same of the source that is only resized."""
+    @property
+    def gain_percent(self) -> dict[str, float]:
+        """Change of each score by registration [%], NaN where undefined."""
+    @property
+    def frames(self) -> list[tuple[dict[str, float], dict[str, float]]]:
+        """Registered and unregistered scores of each frame."""
+    def table(self) -> str:
+        """The scores as text, one line each."""
+
+class Evaluator:
+    """Judges a rig on frames, one by one."""
+    def __init__(self, rig: Rig, width: int = 640, num_threads: int = 0) -> None:
+        """width: the reference is reduced by the smallest integer that makes it at most this
+        wide [px]. num_threads: 0 means all cores.
+        """
+    def add(self, reference: NDArray[Any], source: NDArray[Any], depth: NDArray[Any]) -> None:
+        """Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m]."""
+    def result(self) -> Evaluation:
+        """The Evaluation; ValueError without a frame."""
+
+def describe(rig: Rig) -> dict[str, Any]:
+    """What follows from the rig's parameters, in px, deg and m.
+
+    rotation_deg turns the source camera out of the reference camera's axes: pan to the right,
+    then tilt up, then roll clockwise. Parallax is the distance from the point at infinity.
+    """
+
+def facts_text(rig: Rig) -> str:
+    """describe() and the cameras, as lines."""
+
+def display_gray(image: NDArray[Any]) -> NDArray[uint8]:
+    """Gray for the eye, (H, W) uint8: 1 to 99 % of the non-zero pixels stretched to 0 to 255."""
+
+def overlay(
+    reference: NDArray[Any], registered: NDArray[Any], valid: NDArray[Any] | None = None
+) -> NDArray[uint8]:
+    """Red-cyan composite (H, W, 3) uint8 of two images of one size: reference red, other cyan.
+
+    Where the other is not valid (mask (H, W), nonzero where it is) the reference alone is
+    shown, in gray.
     """

@@ -22,7 +22,7 @@ from ._core import CalibrationOptions, Pinhole, Rig
 from .cli_options import options
 from .demo import run_demo
 from .depth.options import DEPTH_OPTIONS
-from .evaluate import evaluate
+from .evaluate import as_document, evaluate
 from .flow import FlowProvider, NetworkFlow
 from .footage import camera_infos, is_bag, is_video
 from .footage.options import FOOTAGE_OPTIONS
@@ -34,7 +34,7 @@ from .frames import (
     size_of,
     write_bytes,
 )
-from .inspection import as_lines, describe
+from .inspection import describe, facts_text
 from .models_command import models
 from .pipeline import (
     Frames,
@@ -359,7 +359,7 @@ def calibrate_command(
         if choice.unusable:
             first = choice.unusable[0]
             # What cannot be decoded names its file.
-            named = "" if first.fields is None else f"{frames.references.where(first.index)}: "
+            named = f"{frames.references.where(first.index)}: " if first.decoded else ""
             why = named + first.reason
             if not choice.indices:
                 raise InputError(f"none of {len(choice.candidates)} frames can be used; {why}")
@@ -531,7 +531,7 @@ def evaluate_command(
     click.echo(result.table())
     if json_file:
         names = [frames.references.where(index) for index in range(len(frames))]
-        write_json(json_file, {"rig": str(rig_file), "files": names} | result.to_dict())
+        write_json(json_file, {"rig": str(rig_file), "files": names} | as_document(result))
     if not result.valid_share:
         stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")
 
@@ -597,12 +597,8 @@ def inspect_command(rig_file: Path, as_json: bool) -> None:
         for info in camera_infos(rig_file):
             click.echo(info.line())
         return
-    facts = describe(Rig.load(rig_file))
-    if as_json:
-        click.echo(json.dumps(finite(facts), indent=2))
-        return
-    for line in as_lines(facts):
-        click.echo(line)
+    rig = Rig.load(rig_file)
+    click.echo(json.dumps(finite(describe(rig)), indent=2) if as_json else facts_text(rig))
 
 
 # -- report --------------------------------------------------------------------------------------

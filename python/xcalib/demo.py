@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import cv2
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from . import synthetic
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig
 from .frames import Image, check_folder_writable, display_gray, overlay, size_of, write_image
-from .inspection import vector
 from .pipeline import Frames, progress, run_calibration, save_rig
 from .registration import RegistrationOptions, run_registration
 
@@ -100,3 +99,8 @@ def colour(image: Image) -> NDArray[np.uint8]:
     if image.dtype != np.uint8:
         image = display_gray(image)
     return image if image.ndim == 3 else np.dstack([image] * 3)
+
+
+def vector(values: Iterable[float]) -> str:
+    """Numbers as text."""
+    return " ".join(f"{value:+.4f}" for value in values)

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import tempfile
 import threading
-from collections.abc import Callable, Collection, Hashable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,17 +22,38 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ._core import Rig
+from ._core import InputError, Rig, display_gray, natural_order, overlay, pair_files
 
 Image = NDArray[Any]
 Size = tuple[int, int]
 """Width and height [px]."""
 
+__all__ = [
+    "IMAGE_SUFFIXES",
+    "DecodeError",
+    "Image",
+    "InputError",
+    "Size",
+    "as_image",
+    "check_file_writable",
+    "check_folder_writable",
+    "decode",
+    "display_gray",
+    "fit_rig",
+    "gray",
+    "is_truncated",
+    "list_files",
+    "overlay",
+    "pair",
+    "quiet_opencv",
+    "read_image",
+    "same_aspect",
+    "size_of",
+    "write_bytes",
+    "write_image",
+]
+
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
-
-
-class InputError(ValueError):
-    """Input that cannot be used; the message names the file or argument and what was expected."""
 
 
 class DecodeError(InputError):
@@ -41,12 +61,6 @@ class DecodeError(InputError):
 
 
 # -- Names ---------------------------------------------------------------------------------------
-
-
-def natural_key(name: str) -> tuple[Any, ...]:
-    """Sort key that compares runs of digits as numbers: ``a2`` before ``a10``."""
-    parts = re.split(r"([0-9]+)", name.casefold())  # text at even places, digits at odd ones
-    return (*(int(part) if i % 2 else part for i, part in enumerate(parts)), name)
 
 
 def list_files(folder: str | Path, suffixes: Collection[str] = IMAGE_SUFFIXES) -> list[Path]:
@@ -64,66 +78,13 @@ def list_files(folder: str | Path, suffixes: Collection[str] = IMAGE_SUFFIXES) -
     ]
     if not paths:
         raise InputError(f"{folder}: empty, expected {kinds} files in it")
-    return sorted(paths, key=lambda path: natural_key(path.name))
+    return [paths[index] for index in natural_order([path.name for path in paths])]
 
 
 def pair(first: Sequence[Path], second: Sequence[Path]) -> list[tuple[Path, Path]]:
-    """Pair the files of two folders, in the order of the first.
-
-    1. The counts must agree.
-    2. Files of the same stem belong together (``00007.png`` and ``00007.tiff``).
-    3. If no stem is common, files with the same numbers in their names do
-       (``FLIR_00007_Z`` and ``FLIR_00007_T``).
-    4. If no number is common either, natural order decides.
-
-    Names that agree only in part are an error: a frame is missing somewhere, and natural order
-    would pair every later one with a stranger.
-    """
-    folders = first[0].parent, second[0].parent
-    for key in (_stem, _numbers):
-        partners = [_by_key(paths, key) for paths in (first, second)]
-        common = partners[0].keys() & partners[1].keys()
-        if not common:
-            continue
-        lost = [path for own in partners for k, path in own.items() if k not in common]
-        if not lost:
-            return [(path, partners[1][key(path)]) for path in first]
-        raise InputError(
-            f"{folders[0]} ({len(first)} files) and {folders[1]} ({len(second)} files) do not"
-            f" pair: without a partner {_few(lost)};"
-            " expected the same names or numbers in both"
-        )
-    if len(first) != len(second):
-        raise InputError(
-            f"{folders[0]} has {len(first)} files, {folders[1]} has {len(second)};"
-            " expected as many in both, with the same names"
-        )
-    return list(zip(first, second, strict=True))
-
-
-def _stem(path: Path) -> Hashable:
-    return path.stem
-
-
-def _numbers(path: Path) -> Hashable:
-    return tuple(int(digits) for digits in re.findall(r"[0-9]+", path.stem))
-
-
-def _by_key(paths: Sequence[Path], key: Callable[[Path], Hashable]) -> dict[Hashable, Path]:
-    """Files by their key; empty where keys are missing or not unique, and so tell nothing."""
-    found = {key(path): path for path in paths}
-    if key is _stem and len(found) < len(paths):
-        twin = next(path for path in paths if found[path.stem] != path)
-        raise InputError(
-            f"{twin.parent} has both {twin.name} and {found[twin.stem].name};"
-            " expected one file per frame"
-        )
-    return found if len(found) == len(paths) and () not in found else {}
-
-
-def _few(paths: Sequence[Path], count: int = 3) -> str:
-    names = ", ".join(f"{path.parent.name}/{path.name}" for path in paths[:count])
-    return names + (f" and {len(paths) - count} more" if len(paths) > count else "")
+    """Pair the files of two folders, in the order of the first, see `pair_files`."""
+    partners = pair_files(list(first), list(second))
+    return [(path, second[index]) for path, index in zip(first, partners, strict=True)]
 
 
 # -- Reading -------------------------------------------------------------------------------------
@@ -218,21 +179,10 @@ def same_aspect(size: Size, reference: Size) -> bool:
 
 def fit_rig(rig: Rig, reference: Size, source: Size) -> Rig:
     """The rig for images of these sizes: itself, or rescaled when both aspects are the same."""
-    for name, camera, size in (
-        ("reference", rig.reference, reference),
-        ("source", rig.source, source),
-    ):
-        if not same_aspect(size, (camera.width, camera.height)):
-            raise InputError(
-                f"{name} images are {size[0]}x{size[1]}, but the rig's {name} camera is"
-                f" {camera.width}x{camera.height}; expected that size or the same aspect"
-            )
-    sizes = (*reference, *source)
-    own = (rig.reference.width, rig.reference.height, rig.source.width, rig.source.height)
-    return rig if sizes == own else rig.resized(*sizes)
+    return rig.fitted(*reference, *source)
 
 
-# -- Gray and overlay ----------------------------------------------------------------------------
+# -- Gray ----------------------------------------------------------------------------------------
 
 
 def gray(image: Image) -> NDArray[np.float32]:
@@ -242,28 +192,6 @@ def gray(image: Image) -> NDArray[np.float32]:
     if image.dtype == np.float32:
         return image
     return image.astype(np.float32) / np.float32(np.iinfo(image.dtype).max)
-
-
-def display_gray(image: Image) -> NDArray[np.uint8]:
-    """Gray for the eye: 1 to 99 % of the non-zero pixels stretched to 0 to 255."""
-    values = gray(image)
-    used = values[np.isfinite(values) & (values != 0)]
-    low, high = np.percentile(used, (1, 99)) if used.size else (0.0, 1.0)
-    scaled = (values - low) * (255 / max(high - low, 1e-6))
-    return np.nan_to_num(scaled).clip(0, 255).astype(np.uint8)
-
-
-def overlay(
-    reference: Image, registered: Image, valid: NDArray[np.bool_] | None = None
-) -> NDArray[np.uint8]:
-    """Red-cyan composite ``(H, W, 3)`` of two images of one size: reference red, other cyan.
-
-    Where the other is not valid the reference alone is shown, in gray.
-    """
-    red, cyan = display_gray(reference), display_gray(registered)
-    if valid is not None:
-        cyan = np.where(valid, cyan, red)
-    return np.dstack([cyan, cyan, red])
 
 
 # -- Writing -------------------------------------------------------------------------------------

@@ -13,8 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from ._core import CalibrationOptions, CalibrationResult, Rig, calibrate, choose_frames
-from .choose import Choice, choose_informed
+from ._core import (
+    CalibrationOptions,
+    CalibrationResult,
+    Choice,
+    Rig,
+    calibrate,
+    choose_frames,
+    fit_plane,
+    frames_to_judge_plane,
+)
+from .choose import choose_informed
 from .depth import (
     PNG_SCALE,
     DepthProvider,
@@ -24,7 +33,6 @@ from .depth import (
     NetworkOptions,
     PlaneDepth,
 )
-from .depth.plane_fit import fit_plane, spread
 from .flow import FlowProvider
 from .footage import Matching, Pairs, Stream, TopicDepth, open_pairs
 from .footage.opening import PickedDepth
@@ -32,6 +40,8 @@ from .frames import DecodeError, Image, InputError, fit_rig, size_of
 from .thermal import scalar_sources
 
 T = TypeVar("T")
+
+PLANE = PlaneDepth()
 
 
 def progress(items: Iterable[T], total: int, what: str, quiet: bool = False) -> Iterator[T]:
@@ -58,11 +68,11 @@ class Frames:
         source: Path,
         depth_spec: str,
         depth_scale: float = PNG_SCALE,
-        camera_height: float = PlaneDepth.camera_height,
-        horizon: float = PlaneDepth.horizon,
-        far: float = PlaneDepth.far,
-        plane_hfov: float = PlaneDepth.hfov_deg,
-        plane_roll: float = PlaneDepth.roll_deg,
+        camera_height: float = PLANE.camera_height,
+        horizon: float = PLANE.horizon,
+        far: float = PLANE.far,
+        plane_hfov: float = PLANE.hfov_deg,
+        plane_roll: float = PLANE.roll_deg,
         depth_recipe: str | None = None,
         depth_focal: float | None = None,
         inverse_scale: float | None = None,
@@ -247,7 +257,7 @@ def with_fitted_plane(
     plane = frames.given_depth
     if not isinstance(plane, PlaneDepth):
         raise ValueError(f"depth is {type(plane).__name__}, expected a PlaneDepth to refine")
-    chosen = spread(chosen)
+    chosen = [chosen[index] for index in frames_to_judge_plane(len(chosen))]
     references = [frames.references[index] for index in chosen]
     sources = [frames.sources[index] for index in chosen]
     with tqdm(desc="plane", unit="fit", disable=True if quiet else None, leave=False) as bar:

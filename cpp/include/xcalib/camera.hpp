@@ -66,6 +66,11 @@ struct Rig {
     void validate() const;
 };
 
+// The rig for images of these sizes [px]: itself, or rescaled where both have the rig's aspects, to
+// within a pixel. Throws InputError where one has not.
+Rig fitted(const Rig& rig, int reference_width, int reference_height, int source_width,
+           int source_height);
+
 // Eq. (unprojection): the point at depth `z` behind pixel (u, v).
 Eigen::Vector3d unproject(const Pinhole& camera, double u, double v, double z);
 

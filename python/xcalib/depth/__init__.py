@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from .._core import PlaneDepth
 from ..frames import InputError
 from .files import DEPTH_SUFFIXES, PNG_SCALE, FolderDepth, read_depth
 from .measured import MeasuredDepth
 from .network import NetworkDepth, NetworkOptions
-from .plane import PlaneDepth
 from .provider import Depth, DepthProvider, files_of, is_parallel
 
 __all__ = [

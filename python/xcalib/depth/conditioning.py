@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import compressed_guide
 from ..frames import Image, size_of
-from .completion import compressed
 from .provider import Depth, DepthProvider, reciprocal
 
 Array = NDArray[Any]
@@ -52,7 +52,7 @@ class SteadyDepth:
         depth = self.provider(index, reference)
         known = depth > 0
         inverse = reciprocal(depth)
-        image = compressed(reference, size_of(depth))
+        image = compressed_guide(reference, *size_of(depth))
         count = known.astype(np.float32)
         if self._last == index - 1 and self._inverse.shape == inverse.shape:
             predicted, before, seen = self._carried(image)

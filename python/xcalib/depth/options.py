@@ -7,10 +7,12 @@ from typing import Any
 
 import click
 
+from .._core import PlaneDepth
 from ..cli_options import file, number
 from .files import PNG_SCALE
 from .measured import MeasuredDepth
-from .plane import PlaneDepth
+
+PLANE = PlaneDepth()
 
 DEPTH_OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option(
@@ -27,26 +29,26 @@ DEPTH_OPTIONS: tuple[Callable[[Any], Any], ...] = (
     number(
         "--camera-height",
         "M",
-        PlaneDepth.camera_height,
+        PLANE.camera_height,
         "Plane: height of the reference camera above the road [m].",
     ),
     number(
         "--horizon",
         "F",
-        PlaneDepth.horizon,
+        PLANE.horizon,
         "Plane: row of the horizon [fraction of the image height from the top].",
     ),
-    number("--far", "M", PlaneDepth.far, "Plane: largest depth, at and above the horizon too [m]."),
+    number("--far", "M", PLANE.far, "Plane: largest depth, at and above the horizon too [m]."),
     number(
         "--plane-hfov",
         "DEG",
-        PlaneDepth.hfov_deg,
+        PLANE.hfov_deg,
         "Plane: horizontal field of view of the reference camera [deg].",
     ),
     number(
         "--plane-roll",
         "DEG",
-        PlaneDepth.roll_deg,
+        PLANE.roll_deg,
         "Plane: how far the horizon falls towards the right [deg].",
     ),
     click.option(

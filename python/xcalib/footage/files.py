@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
+import numpy as np
 
+from .._core import natural_order, times_of_names
 from ..frames import (
     IMAGE_SUFFIXES,
     DecodeError,
@@ -17,12 +19,11 @@ from ..frames import (
     InputError,
     as_image,
     list_files,
-    natural_key,
     quiet_opencv,
     read_image,
 )
 from .stream import Stream
-from .times import read_times, times_of_names
+from .times import read_times
 
 TIME_TABLES = ("timestamps.csv", "timestamps.txt")
 """Read, if there, from the folder of the images."""
@@ -35,7 +36,8 @@ class ImageFiles(Stream):
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = list(paths)
-        self.times = times_of_names([path.stem for path in self.paths])
+        times = times_of_names([path.stem for path in self.paths])
+        self.times = None if times is None else np.array(times)
         for table in TIME_TABLES:
             if self.paths and (self.paths[0].parent / table).is_file():
                 self.times = read_times(self.paths[0].parent / table, self)
@@ -71,7 +73,7 @@ def matching_files(pattern: Path) -> list[Path]:
     found = [path for path in found if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file()]
     if not found:
         raise InputError(f"{pattern}: no image file matches")
-    return sorted(found, key=lambda path: natural_key(str(path)))
+    return [found[index] for index in natural_order([str(path) for path in found])]
 
 
 class Pages(Stream):

@@ -130,7 +130,7 @@ class Pairs:
             with contextlib.suppress(InputError):
                 pairings = [pair_streams(*streams, "time", offset) for offset in candidates]
                 every = np.unique(np.concatenate([found.references for found in pairings]))
-                wide = replace(self, pairing=replace(self.pairing, references=every))
+                wide = replace(self, pairing=Pairing("time", every.tolist(), []))
                 depth = open_depth(wide)
         if depth is None:
             wide, depth = self, open_depth(self)
@@ -162,7 +162,7 @@ class Pairs:
             return PickedDepth(provider, used.tolist())
         scans = measured is not None and measured.lidar_calibration is not None
         files = list_files(folder, POINT_SUFFIXES if scans else DEPTH_SUFFIXES)
-        matched = match_depths(self.all_references, used, files, folder)
+        matched = match_depths(self.all_references, used, files)
         return PickedDepth(open_depth(spec, files, *given), matched)
 
 

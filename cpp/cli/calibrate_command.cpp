@@ -1,0 +1,395 @@
+#include <cmath>
+#include <map>
+#include <regex>
+
+#include "commands.hpp"
+#include "files.hpp"
+#include "frames.hpp"
+#include "xcalib/calibrate.hpp"
+#include "xcalib/choose.hpp"
+#include "xcalib/rig_file.hpp"
+
+namespace xcalib::cli {
+namespace {
+
+struct Arguments {
+    FrameArguments frames;
+    std::string output, choose = "informed", colormap = "auto", initial, search = "auto",
+                        flow = "auto", solver = "ceres", report;
+    std::optional<std::string> reference_intrinsics, source_intrinsics;
+    bool explain = false, refine_plane = false;
+    CalibrationOptions options;
+};
+
+const std::map<std::string, SearchMode> kSearchModes = {{"auto", SearchMode::automatic},
+                                                        {"full", SearchMode::full},
+                                                        {"local", SearchMode::local},
+                                                        {"off", SearchMode::off}};
+const std::map<std::string, FlowMode> kFlowModes = {
+    {"auto", FlowMode::automatic}, {"off", FlowMode::off}, {"patch", FlowMode::on}};
+
+// FX,FY,CX,CY [px], for images of a size that is not known yet.
+Pinhole intrinsics(const std::string& flag, const std::string& text) {
+    const auto bad = [&](const std::string& why) {
+        return InputError("Invalid value for '" + flag + "': '" + text + "'" + why);
+    };
+    std::vector<double> numbers;
+    std::istringstream parts(text + ",");
+    for (std::string part; std::getline(parts, part, ',');) {
+        std::size_t used = 0;
+        try {
+            numbers.push_back(std::stod(part, &used));
+        } catch (const std::exception&) {
+        }
+        if (part.empty() || used != part.size()) throw bad(" is not four numbers FX,FY,CX,CY");
+    }
+    if (numbers.size() != 4) throw bad(" is not four numbers FX,FY,CX,CY");
+    bool good = numbers[0] > 0 && numbers[1] > 0;
+    for (const double value : numbers) good = good && std::isfinite(value);
+    if (!good) throw bad(": expected finite numbers, FX and FY above 0 px");
+    return {1, 1, numbers[0], numbers[1], numbers[2], numbers[3]};
+}
+
+std::string left_out(std::size_t count, const std::string& first) {
+    return std::to_string(count) + " unusable " + (count == 1 ? "frame is" : "frames are") +
+           " left out; " + first;
+}
+
+// The frames that say most about the rig.
+std::vector<int> choose_by_content(const Frames& frames, const Arguments& arguments,
+                                   Console& console) {
+    const std::vector<int> drawn =
+        frames_to_look_at(frames.size(), arguments.options.max_frames, arguments.options.seed);
+    // Depth counts where it is cheap.
+    const bool with_depth = !arguments.frames.depth.complete;
+    std::vector<Candidate> candidates;
+    for (const int index : drawn) {
+        try {
+            const cv::Mat reference = (*frames.references)[index];
+            const cv::Mat source = (*frames.sources)[index];
+            const cv::Mat depth = with_depth ? (*frames.depth)(index, reference) : cv::Mat();
+            const ImageView depth_view = view_of(depth);
+            candidates.push_back(look_at(index, view_of(reference), view_of(source),
+                                         with_depth ? &depth_view : nullptr));
+        } catch (const DecodeError& error) {
+            Candidate candidate;
+            candidate.index = index;
+            candidate.decoded = false;
+            candidate.reason = error.what();
+            candidates.push_back(candidate);
+        }
+        console.progress(
+            "choosing", static_cast<double>(candidates.size()) / static_cast<double>(drawn.size()));
+    }
+    const Choice choice = choose(std::move(candidates), arguments.options.max_frames);
+    if (arguments.explain)
+        console.line(choice.table([&](int index) { return frames.references->name(index); }));
+    for (const Candidate& c : choice.candidates)
+        console.event("candidate", {{"frame", frames.references->where(c.index)},
+                                    {"taken", c.taken},
+                                    {"agreement", number(c.agreement)},
+                                    {"gain", number(c.gain)},
+                                    {"reason", c.reason}});
+    const std::vector<Candidate> unusable = choice.unusable();
+    if (!unusable.empty()) {
+        const Candidate& first = unusable[0];
+        // What cannot be decoded names its file.
+        const std::string why =
+            (first.decoded ? frames.references->where(first.index) + ": " : "") + first.reason;
+        if (choice.indices.empty())
+            throw InputError("none of " + std::to_string(choice.candidates.size()) +
+                             " frames can be used; " + why);
+        console.warn(left_out(unusable.size(), why));
+    }
+    return choice.indices;
+}
+
+// Frames in memory, and as the core takes them.
+struct Loaded {
+    std::vector<int> indices;
+    std::vector<Frame> frames;
+
+    std::vector<ImageView> views(cv::Mat Frame::*kind) const {
+        std::vector<ImageView> list;
+        for (const Frame& frame : frames) list.push_back(view_of(frame.*kind));
+        return list;
+    }
+};
+
+Loaded load(const Frames& frames, const std::vector<int>& chosen, Console& console) {
+    Loaded loaded;
+    std::vector<DecodeError> failures;
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+        try {
+            loaded.frames.push_back(frames.read(chosen[i]));
+            loaded.indices.push_back(chosen[i]);
+        } catch (const DecodeError& error) {
+            failures.push_back(error);
+        }
+        console.progress("loading",
+                         static_cast<double>(i + 1) / static_cast<double>(chosen.size()));
+    }
+    if (loaded.frames.empty()) {
+        if (failures.empty()) throw InputError("no frame to calibrate on");
+        throw failures[0];
+    }
+    if (!failures.empty()) console.warn(left_out(failures.size(), failures[0].what()));
+    return loaded;
+}
+
+// The message with the file that the core, which sees pixels only, calls `frame N`.
+std::string with_file_name(const std::string& message, const Frames& frames,
+                           const std::vector<int>& chosen) {
+    static const std::regex frame(R"(\bframe (\d{1,9})\b)");
+    std::smatch found;
+    if (!std::regex_search(message, found, frame)) return message;
+    const std::size_t index = std::stoul(found[1]);
+    if (index >= chosen.size()) return message;
+    return message + " (frame " + found[1].str() + " is " +
+           frames.references->where(chosen[index]) + ")";
+}
+
+CalibrationResult calibrated(const Frames& frames, const Loaded& loaded,
+                             const CalibrationOptions& options, std::optional<Rig> initial,
+                             Console& console) {
+    const Frame& first = loaded.frames[0];
+    if (initial)
+        initial = fitted(*initial, first.reference.cols, first.reference.rows, first.source.cols,
+                         first.source.rows);
+    try {
+        return calibrate(
+            loaded.views(&Frame::reference), loaded.views(&Frame::source),
+            loaded.views(&Frame::depth), initial, options,
+            [&](const std::string& stage, double share) { console.progress(stage, share); });
+    } catch (const std::invalid_argument& error) {
+        throw InputError(with_file_name(error.what(), frames, loaded.indices));
+    }
+}
+
+Json json_of(const CalibrationReport& report) {
+    constexpr double kDegrees = 180 / 3.14159265358979323846;
+    Json candidates = Json::array(), levels = Json::array(), steps = Json::array();
+    for (const CandidateReport& c : report.candidates)
+        candidates.push_back({{"score", number(c.score)},
+                              {"correlation", number(c.correlation)},
+                              {"overlap", number(c.overlap)},
+                              {"refined_nec", number(c.refined_nec)},
+                              {"reference_hfov_deg", number(c.refined.reference.hfov() * kDegrees)},
+                              {"source_hfov_deg", number(c.refined.source.hfov() * kDegrees)}});
+    for (const LevelReport& l : report.levels)
+        levels.push_back({{"factor", l.factor},
+                          {"stage", l.stage},
+                          {"width", l.width},
+                          {"height", l.height},
+                          {"iterations", l.iterations},
+                          {"initial_cost", number(l.initial_cost)},
+                          {"final_cost", number(l.final_cost)},
+                          {"nec", number(l.nec)},
+                          {"aligned", number(l.aligned)},
+                          {"valid_share", number(l.valid_share)},
+                          {"condition_number", number(l.condition_number)},
+                          {"seconds", number(l.seconds)},
+                          {"stopped", l.stopped}});
+    for (const AdamStep& s : report.steps)
+        steps.push_back({{"learning_rate", number(s.learning_rate)},
+                         {"image", number(s.image)},
+                         {"flow", number(s.flow)},
+                         {"prior", number(s.prior)},
+                         {"total", number(s.total)}});
+    return {{"converged", report.converged},
+            {"message", report.message},
+            {"seconds", number(report.seconds)},
+            {"search_seconds", number(report.search_seconds)},
+            {"working_width", report.working_width},
+            {"working_height", report.working_height},
+            {"nec", number(report.nec)},
+            {"baseline_nec", number(report.baseline_nec)},
+            {"contrast", number(report.contrast)},
+            {"repeatability_px", number(report.repeatability_px)},
+            {"valid_share", number(report.valid_share)},
+            {"frames", report.frames},
+            {"candidates", candidates},
+            {"levels", levels},
+            {"steps", steps}};
+}
+
+void check(const Arguments& a) {
+    if (a.reference_intrinsics && (a.options.reference_hfov_deg || a.options.optimize_reference))
+        throw InputError(
+            "--reference-intrinsics are kept; expected no --reference-hfov or --optimize-reference"
+            " with them");
+    if (a.explain && a.choose != "informed")
+        throw InputError("--explain tells of --choose informed, expected that too");
+    if (a.refine_plane && a.frames.depth.spec != "plane")
+        throw InputError("--refine-plane goes with --depth plane, not " + a.frames.depth.spec);
+    if (a.refine_plane && a.frames.depth.complete)
+        throw InputError(
+            "--refine-plane fits the plane itself, which --complete would change; expected only"
+            " one of them");
+    const bool is_network = a.flow.size() > 5 && a.flow.substr(a.flow.size() - 5) == ".onnx";
+    if (is_network)
+        throw InputError("--flow " + a.flow +
+                         ": networks are run by the Python command, `xcalib`; expected auto, off or"
+                         " patch");
+    if (!kFlowModes.count(a.flow))
+        throw InputError("--flow is '" + a.flow + "', expected auto, off or patch");
+}
+
+void run(Arguments a, Console& console) {
+    check(a);
+    CalibrationOptions& options = a.options;
+    options.search.mode = kSearchModes.at(a.search);
+    options.flow = kFlowModes.at(a.flow);
+    options.solver = a.solver == "adam" ? Solver::adam : Solver::ceres;
+    std::optional<Pinhole> reference_camera, source_camera;
+    if (a.reference_intrinsics)
+        reference_camera = intrinsics("--reference-intrinsics", *a.reference_intrinsics);
+    if (a.source_intrinsics)
+        source_camera = intrinsics("--source-intrinsics", *a.source_intrinsics);
+    options.validate();
+
+    std::optional<Rig> initial;
+    if (!a.initial.empty()) initial = load_rig(a.initial);
+    Frames frames = open_frames(a.frames, initial, console);
+    check_file_writable(a.output);
+    if (!a.report.empty()) check_file_writable(a.report);
+    frames = with_scalar_sources(std::move(frames), a.colormap, console);
+
+    const std::vector<int> chosen =
+        a.choose == "informed" ? choose_by_content(frames, a, console)
+                               : choose_frames(frames.size(), options.max_frames, options.seed);
+    Loaded loaded = load(frames, chosen, console);
+    const auto sized = [](Pinhole camera, const cv::Mat& image) {
+        camera.width = image.cols;
+        camera.height = image.rows;
+        return camera;
+    };
+    if (reference_camera)
+        options.reference_camera = sized(*reference_camera, loaded.frames[0].reference);
+    if (source_camera) options.source_camera = sized(*source_camera, loaded.frames[0].source);
+
+    CalibrationResult result = calibrated(frames, loaded, options, initial, console);
+    if (a.refine_plane) {
+        std::vector<ImageView> references, sources;
+        for (const int i : frames_to_judge_plane(static_cast<int>(loaded.frames.size()))) {
+            const Frame& frame = loaded.frames[static_cast<std::size_t>(i)];
+            references.push_back(view_of(frame.reference));
+            sources.push_back(view_of(frame.source));
+        }
+        int fits = 0;
+        const PlaneDepth plane =
+            fit_plane(references, sources, a.frames.depth.plane, result.rig, options,
+                      [&] { console.progress("plane", std::min(0.99, ++fits / 18.0)); });
+        const DepthPointer depth = plane_depth(plane);
+        for (std::size_t i = 0; i < loaded.frames.size(); ++i)
+            loaded.frames[i].depth = (*depth)(loaded.indices[i], loaded.frames[i].reference);
+        result = calibrated(frames, loaded, options, result.rig, console);
+        std::ostringstream text;
+        text << "plane: --horizon " << plane.horizon << " --plane-roll " << plane.roll_deg;
+        console.line(text.str());
+        console.event("plane", {{"horizon", plane.horizon}, {"plane_roll", plane.roll_deg}});
+    }
+    const Path output(a.output);
+    if (output.has_parent_path()) std::filesystem::create_directories(output.parent_path());
+    save_rig(result.rig, a.output);
+    console.line(result.report.brief());
+    console.line("rig: " + a.output);
+    Json files = Json::array();
+    for (const int index : loaded.indices) files.push_back(frames.references->where(index));
+    Json document{{"format", "xcalib-report"}, {"version", 1}, {"rig", a.output}, {"files", files}};
+    document.update(json_of(result.report));
+    if (!a.report.empty()) {
+        write_file(a.report, document.dump(2, ' ', true, Json::error_handler_t::replace) + "\n");
+        console.line("report: " + a.report);
+    }
+    console.result(document);
+    if (!result.converged) throw NotTrusted(result.report.message);
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app, Console& console) {
+    CLI::App* command = app.add_subcommand(
+        "calibrate", "Estimate both cameras and their pose, and write a rig file.");
+    command->footer("The rig is written even if it is not to be trusted (exit code 3).");
+    auto arguments = std::make_shared<Arguments>();
+    Arguments& a = *arguments;
+    command->add_option("REFERENCE", a.frames.reference)->required();
+    command->add_option("SOURCE", a.frames.source)->required();
+    add_depth(*command, a.frames.depth);
+    add_footage(*command, a.frames);
+    command->add_option("-o,--output", a.output, "Rig file to write (YAML).")
+        ->type_name("RIG")
+        ->required();
+    command->add_option("--frames", a.options.max_frames, "Frames to use at most.")
+        ->type_name("N")
+        ->check(CLI::Range(1, 2147483647))
+        ->capture_default_str();
+    command->add_option("--seed", a.options.seed, "Seed of the frame choice.")
+        ->type_name("N")
+        ->capture_default_str();
+    command
+        ->add_option("--choose", a.choose,
+                     "Frames by what they say about the rig (informed; looks at 4 N), or spread"
+                     " over the footage (spread).")
+        ->type_name("HOW")
+        ->check(CLI::IsMember({"informed", "spread"}))
+        ->capture_default_str();
+    command->add_flag("--explain", a.explain,
+                      "Print why each frame was taken or left (--choose informed).");
+    add_colormap(*command, a.colormap);
+    add_threads(*command, a.options.num_threads);
+    command
+        ->add_option("--initial", a.initial, "Rig file to start from.  [default: none, searched]")
+        ->type_name("RIG");
+    command
+        ->add_option("--search", a.search,
+                     "Global search before refinement: full, local (around the initial rig), off,"
+                     " or auto.")
+        ->type_name("HOW")
+        ->check(CLI::IsMember({"auto", "full", "local", "off"}))
+        ->capture_default_str();
+    command
+        ->add_option("--flow", a.flow,
+                     "The flow term: patch, built in; off; auto is patch where nothing is"
+                     " searched.")
+        ->type_name("auto|off|patch")
+        ->capture_default_str();
+    command
+        ->add_option("--solver", a.solver, "ceres, or adam: the paper's, which searches nothing.")
+        ->type_name("NAME")
+        ->check(CLI::IsMember({"ceres", "adam"}))
+        ->capture_default_str();
+    command
+        ->add_option("--reference-intrinsics", a.reference_intrinsics,
+                     "Known intrinsics of the reference camera, kept [px].  [default: none]")
+        ->type_name("FX,FY,CX,CY");
+    command
+        ->add_option("--source-intrinsics", a.source_intrinsics,
+                     "Known intrinsics of the source camera, kept [px].  [default: none,"
+                     " estimated]")
+        ->type_name("FX,FY,CX,CY");
+    command
+        ->add_option("--reference-hfov", a.options.reference_hfov_deg,
+                     "Horizontal field of view of the reference camera at the start [deg]."
+                     "  [default: searched]")
+        ->type_name("DEG");
+    command->add_flag("--optimize-reference", a.options.optimize_reference,
+                      "Estimate the reference intrinsics too.  [default: kept]");
+    command
+        ->add_option("--working-width", a.options.working_width,
+                     "Reference width that calibration works at [px].")
+        ->type_name("PX")
+        ->check(CLI::Range(1, 2147483647))
+        ->capture_default_str();
+    command->add_flag("--refine-plane", a.refine_plane,
+                      "With --depth plane: find the horizon and the roll from the footage (some 17"
+                      " quick fits), and print them for `register`.");
+    command->add_option("--report", a.report, "Also write the full report (JSON).")
+        ->type_name("FILE");
+    command->add_flag("--quiet", console.quiet, "No progress.");
+    command->fallthrough();
+    command->callback([arguments, &console] { run(*arguments, console); });
+}
+
+}  // namespace xcalib::cli

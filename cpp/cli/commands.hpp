@@ -1,0 +1,16 @@
+// The commands: each adds itself to the command line, with what it does.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "console.hpp"
+
+namespace xcalib::cli {
+
+void add_calibrate(CLI::App& app, Console& console);
+void add_register(CLI::App& app, Console& console);
+void add_evaluate(CLI::App& app, Console& console);
+void add_inspect(CLI::App& app, Console& console);
+void add_bench(CLI::App& app, Console& console);
+
+}  // namespace xcalib::cli

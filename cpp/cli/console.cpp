@@ -1,0 +1,91 @@
+#include "console.hpp"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <sstream>
+
+namespace xcalib::cli {
+namespace {
+
+std::string one_line(const std::string& text) {
+    std::istringstream words(text);
+    std::string line;
+    for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
+    return line;
+}
+
+}  // namespace
+
+std::atomic<bool> interrupted{false};
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+void Console::clear_bar() {
+    if (bar_) std::cerr << "\r\033[K" << std::flush;
+    bar_ = false;
+}
+
+void Console::put(const std::string& text) {
+    std::cout << text << "\n" << std::flush;
+    if (!std::cout) throw std::runtime_error("cannot write to stdout");
+}
+
+void Console::line(const std::string& text) {
+    const std::lock_guard lock(mutex_);
+    clear_bar();
+    if (!json) put(text);
+}
+
+void Console::result(const Json& fields) { event("result", fields); }
+
+void Console::event(const std::string& name, Json fields) {
+    if (!json) return;
+    const std::lock_guard lock(mutex_);
+    Json object{{"event", name}};
+    object.update(fields);
+    put(object.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+void Console::tell(const std::string& label, const std::string& text) {
+    const std::lock_guard lock(mutex_);
+    clear_bar();
+    std::cerr << label << one_line(text) << std::endl;
+}
+
+void Console::note(const std::string& text) {
+    tell("", text);
+    event("note", {{"message", one_line(text)}});
+}
+
+void Console::warn(const std::string& text) {
+    tell("warning: ", text);
+    event("warning", {{"message", one_line(text)}});
+}
+
+void Console::error(int code, const std::string& text) {
+    tell(code == kNotTrusted ? "not to be trusted: " : "error: ", text);
+    event("end", {{"exit_code", code}, {"message", one_line(text)}});
+}
+
+void Console::progress(const std::string& stage, double fraction) {
+    if (interrupted) throw Interrupted();
+    const int percent = static_cast<int>(100 * fraction);
+    {
+        const std::lock_guard lock(mutex_);
+        if (quiet || (percent == percent_ && stage == stage_)) return;
+        percent_ = percent;
+        stage_ = stage;
+        if (!json && isatty(STDERR_FILENO)) {
+            std::fprintf(stderr, "\r\033[K%s %3d%%", stage.c_str(), percent);
+            bar_ = fraction < 1;
+            if (!bar_) std::fputs("\r\033[K", stderr);
+            std::fflush(stderr);
+        }
+    }
+    event("progress", {{"stage", stage}, {"fraction", fraction}});
+}
+
+}  // namespace xcalib::cli

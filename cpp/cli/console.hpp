@@ -1,0 +1,58 @@
+// What the command says, and where: results on stdout, progress and errors on stderr; with --json
+// all of it as JSON on stdout, an object a line.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace xcalib::cli {
+
+using Json = nlohmann::ordered_json;
+
+enum Exit : int { kDone = 0, kFailed = 1, kWrongInput = 2, kNotTrusted = 3 };
+
+// Null in place of what is not finite, which JSON does not know.
+Json number(double value);
+
+// Ends the command: done, but the result is not to be trusted.
+class NotTrusted : public std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+class Interrupted : public std::runtime_error {
+   public:
+    Interrupted() : std::runtime_error("interrupted") {}
+};
+
+// Set by Ctrl-C and by a request to end.
+extern std::atomic<bool> interrupted;
+
+class Console {
+   public:
+    bool json = false;
+    bool quiet = false;  // no progress
+
+    void line(const std::string& text);  // a result, for people; not with --json
+    void result(const Json& fields);     // a result, for machines; only with --json
+    void event(const std::string& name, Json fields);
+    void note(const std::string& text);
+    void warn(const std::string& text);
+    void error(int code, const std::string& text);
+    // `fraction` of `stage`, (0, 1]; throws Interrupted where asked to end.
+    void progress(const std::string& stage, double fraction);
+
+   private:
+    std::mutex mutex_;
+    bool bar_ = false;  // stands on stderr
+    int percent_ = -1;
+    std::string stage_;
+
+    void clear_bar();
+    void put(const std::string& text);
+    void tell(const std::string& label, const std::string& text);
+};
+
+}  // namespace xcalib::cli

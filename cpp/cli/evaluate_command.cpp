@@ -1,0 +1,93 @@
+#include "commands.hpp"
+#include "files.hpp"
+#include "frames.hpp"
+#include "xcalib/evaluate.hpp"
+#include "xcalib/rig_file.hpp"
+
+namespace xcalib::cli {
+namespace {
+
+struct Arguments {
+    std::string rig, json_file, colormap = "auto";
+    FrameArguments frames;
+    int width = 640, threads = 0;
+};
+
+Json json_of(const Scores& scores) {
+    Json out = Json::object();
+    for (std::size_t i = 0; i < scores.size(); ++i) out[kScoreNames[i]] = number(scores[i]);
+    return out;
+}
+
+Json json_of(const Evaluation& evaluation) {
+    Scores gains;
+    for (std::size_t i = 0; i < gains.size(); ++i) gains[i] = evaluation.gain(i);
+    Json frames = Json::array();
+    for (const auto& [registered, unregistered] : evaluation.frames)
+        frames.push_back(
+            {{"registered", json_of(registered)}, {"unregistered", json_of(unregistered)}});
+    return {{"size", Json::array({evaluation.width, evaluation.height})},
+            {"valid_share", number(evaluation.valid_share)},
+            {"registered", json_of(evaluation.registered)},
+            {"unregistered", json_of(evaluation.unregistered)},
+            {"gain_percent", json_of(gains)},
+            {"frames", frames}};
+}
+
+void run(const Arguments& a, Console& console) {
+    const Rig rig = load_rig(a.rig);
+    Frames frames = open_frames(a.frames, rig, console);
+    if (!a.json_file.empty()) check_file_writable(a.json_file);
+    frames = with_scalar_sources(std::move(frames), a.colormap, console);
+    Evaluator evaluator(rig, a.width, a.threads);
+    Json files = Json::array();
+    for (int index = 0; index < frames.size(); ++index) {
+        const Frame frame = frames.read(index);
+        evaluator.add(view_of(frame.reference), view_of(frame.source), view_of(frame.depth));
+        files.push_back(frames.references->where(index));
+        console.progress("evaluating", static_cast<double>(index + 1) / frames.size());
+    }
+    const Evaluation result = evaluator.result();
+    console.line(result.table());
+    Json document{{"rig", a.rig}, {"files", files}};
+    document.update(json_of(result));
+    if (!a.json_file.empty())
+        write_file(a.json_file, document.dump(2, ' ', true, Json::error_handler_t::replace) + "\n");
+    console.result(document);
+    if (result.valid_share == 0)
+        throw NotTrusted("no pixel is valid in " + std::to_string(frames.size()) +
+                         " frames, nothing could be scored");
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app, Console& console) {
+    CLI::App* command = app.add_subcommand(
+        "evaluate",
+        "Score the registered SOURCE against REFERENCE, beside the source that is only resized.");
+    auto arguments = std::make_shared<Arguments>();
+    Arguments& a = *arguments;
+    command->add_option("RIG", a.rig)->required();
+    command->add_option("REFERENCE", a.frames.reference)->required();
+    command->add_option("SOURCE", a.frames.source)->required();
+    add_depth(*command, a.frames.depth);
+    add_footage(*command, a.frames);
+    command
+        ->add_option("--width", a.width,
+                     "Judge at the reference size divided by the least integer that makes it this"
+                     " wide [px].")
+        ->type_name("PX")
+        ->check(CLI::Range(1, 2147483647))
+        ->capture_default_str();
+    command
+        ->add_option("--json", a.json_file,
+                     "Also write all scores, frame by frame (JSON). On stdout: `xcalib-cli --json"
+                     " evaluate`.")
+        ->type_name("FILE");
+    add_colormap(*command, a.colormap);
+    add_threads(*command, a.threads);
+    command->add_flag("--quiet", console.quiet, "No progress.");
+    command->callback([arguments, &console] { run(*arguments, console); });
+}
+
+}  // namespace xcalib::cli

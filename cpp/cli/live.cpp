@@ -1,0 +1,84 @@
+#include <chrono>
+#include <memory>
+
+#include "capture.hpp"
+#include "depth.hpp"
+#include "depth_stream.hpp"
+#include "registration.hpp"
+#include "xcalib/complete_depth.hpp"
+
+namespace xcalib::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+std::string name_of(int index) {
+    const std::string digits = std::to_string(index);
+    return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
+}
+
+void check(const RegisterArguments& a) {
+    const bool from_fd = a.depth_fd >= 0;
+    if (from_fd == !a.frames.depth.spec.empty() || (!from_fd && a.frames.depth.spec != "plane"))
+        throw InputError("--live: expected either --depth-fd N or --depth plane");
+    a.frames.depth.plane.validate();
+}
+
+}  // namespace
+
+Totals register_live(const RegisterArguments& a, const Rig& rig, Console& console) {
+    check(a);
+    Capture references(a.frames.reference), sources(a.frames.source);
+    std::unique_ptr<DepthStream> stream;
+    if (a.depth_fd >= 0) stream = std::make_unique<DepthStream>(a.depth_fd);
+    const DepthPointer plane = plane_depth(a.frames.depth.plane);
+    const std::unique_ptr<Sink> sink = open_sink(a.output, a.rate);
+    std::unique_ptr<Registrar> registrar;
+    Totals totals;
+    const auto start = Clock::now();
+    while (!interrupted && (a.max_frames == 0 || totals.frames < a.max_frames)) {
+        // Both are taken before either is decoded: as near in time as two calls can be.
+        if (!references.grab() || !sources.grab()) break;
+        const cv::Mat reference = references.retrieve(), source = sources.retrieve();
+        std::optional<DepthMap> map;
+        if (stream) map = a.depth_sync == "each" ? stream->next() : stream->latest();
+        else map = DepthMap{(*plane)(0, reference), 0};
+        if (!map) break;
+        if (a.frames.depth.complete)
+            map->depth = cv::Mat(completed(view_of(map->depth), view_of(reference),
+                                           a.frames.depth.completion_confidence)
+                                     .pixels,
+                                 true)
+                             .reshape(1, map->depth.rows);
+        if (!registrar)
+            registrar = std::make_unique<Registrar>(
+                fitted(rig, reference.cols, reference.rows, source.cols, source.rows), a.options);
+        const auto before = Clock::now();
+        const Registered result = registered(*registrar, reference, source, map->depth, a.overlays);
+        const double took = milliseconds_since(before);
+        const std::string name = name_of(totals.frames);
+        sink->write(name, result);
+        const long pixels = static_cast<long>(result.mask.total());
+        const long valid = pixels - cv::countNonZero(result.mask);
+        Json event{{"name", name},
+                   {"valid_share", static_cast<double>(valid) / static_cast<double>(pixels)},
+                   {"register_ms", took}};
+        if (stream) event["depth_timestamp_us"] = map->timestamp_us;
+        console.event("frame", event);
+        ++totals.frames;
+        totals.valid += valid;
+        totals.pixels += pixels;
+    }
+    totals.seconds = milliseconds_since(start) / 1e3;
+    if (totals.frames == 0)
+        throw std::runtime_error("no frame came from " + a.frames.reference + ", " +
+                                 a.frames.source + (stream ? " and the depth stream" : ""));
+    sink->close();
+    return totals;
+}
+
+}  // namespace xcalib::cli

@@ -1,0 +1,39 @@
+// The arguments that commands share, as on the Python command line.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "xcalib/complete_depth.hpp"
+#include "xcalib/plane_depth.hpp"
+
+namespace xcalib::cli {
+
+struct DepthArguments {
+    std::string spec;
+    double scale = 1.0 / 256;  // metres per count of a 16-bit PNG
+    PlaneDepth plane;
+    bool complete = false;
+    double completion_confidence = kCompletionConfidence;
+};
+
+struct FrameArguments {
+    std::string reference, source;
+    DepthArguments depth;
+    std::string pairing = "auto";
+    double time_offset = 0.0;
+    std::optional<double> max_gap;
+    std::string reference_times, source_times;
+};
+
+void add_depth(CLI::App& command, DepthArguments& arguments);
+void add_footage(CLI::App& command, FrameArguments& arguments);
+void add_threads(CLI::App& command, int& threads);
+void add_colormap(CLI::App& command, std::string& colormap);
+
+// Options that only the Python command has: they are known here, and refused with its name.
+void add_python_only(CLI::App& command, std::initializer_list<const char*> options,
+                     const std::string& what);
+
+}  // namespace xcalib::cli

@@ -1,0 +1,44 @@
+// Image files in and out.
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "xcalib/error.hpp"
+#include "xcalib/image.hpp"
+
+namespace xcalib::cli {
+
+using Path = std::filesystem::path;
+
+inline const std::vector<std::string> kImageSuffixes = {".png", ".jpg",  ".jpeg",
+                                                        ".tif", ".tiff", ".bmp"};
+
+// A file that cannot be decoded: truncated, or not what its name says.
+class DecodeError : public InputError {
+    using InputError::InputError;
+};
+
+// The pixels of a matrix of 1 or 3 channels, uint8, uint16 or float32.
+ImageView view_of(const cv::Mat& pixels);
+ImageView view_of(const cv::Mat&& pixels) = delete;
+MutableImageView mutable_view_of(cv::Mat& pixels);
+
+// One image, 1 or 3 channels (an alpha channel is dropped), uint8, uint16 or float32, as it is
+// stored: no rotation by EXIF tags, for a camera's geometry is that of its sensor.
+cv::Mat read_image(const Path& file);
+
+// The same of decoded pixels; `where` names them in an InputError.
+cv::Mat as_image(cv::Mat pixels, const std::string& where);
+
+// All channels as they are. Throws DecodeError.
+cv::Mat decode(const Path& file);
+
+// By the suffix; whole or not at all, its folder is made.
+void write_image(const Path& file, const cv::Mat& image);
+
+std::string size_text(const cv::Mat& image);  // 640x480
+
+}  // namespace xcalib::cli

@@ -1,0 +1,118 @@
+#include "video.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <opencv2/videoio.hpp>
+
+namespace xcalib::cli {
+namespace {
+
+// Frames ahead that are reached by decoding on rather than by seeking.
+constexpr int kFew = 64;
+
+class Video : public Stream {
+   public:
+    explicit Video(Path path) : path_(std::move(path)) {
+        open();
+        gray_ = holds_gray(capture_.get(cv::CAP_PROP_CODEC_PIXEL_FORMAT));
+        const int announced = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_COUNT));
+        while (capture_.grab()) frame_times_.push_back(capture_.get(cv::CAP_PROP_POS_MSEC) / 1e3);
+        // Containers estimate their length to a frame or so; a file cut short lacks more.
+        if (frame_times_.empty() || static_cast<double>(frame_times_.size()) < 0.99 * announced - 1)
+            throw InputError(path_.string() + ": cannot decode frame " +
+                             std::to_string(frame_times_.size()) + " of about " +
+                             std::to_string(announced) + ", truncated");
+        bool rising = true;
+        for (std::size_t i = 1; i < frame_times_.size(); ++i)
+            rising = rising && frame_times_[i] > frame_times_[i - 1];
+        if (rising) times = frame_times_;
+        restart();
+    }
+    int size() const override { return static_cast<int>(frame_times_.size()); }
+    std::string name(int index) const override {
+        const std::string digits = std::to_string(index);
+        return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
+    }
+    std::string where(int index) const override {
+        return path_.string() + " frame " + std::to_string(index);
+    }
+
+   private:
+    void open() {
+        try {
+            capture_.open(path_.string(), cv::CAP_FFMPEG);
+        } catch (const cv::Exception&) {
+        }
+        if (!capture_.isOpened())
+            throw InputError(path_.string() + ": cannot decode frame 0, truncated or not a video");
+        // As with images: the geometry is that of the sensor, whatever a tag says of turning it.
+        capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+    }
+
+    void restart() {
+        capture_.release();
+        open();
+        if (gray_) capture_.set(cv::CAP_PROP_CONVERT_RGB, 0);
+        next_ = 0;
+    }
+
+    cv::Mat read(int index) override {
+        // Two halves, or a slower partner, ask for the same frame again.
+        if (last_ != index) {
+            last_image_ = decoded(index);
+            last_ = index;
+        }
+        return last_image_.clone();
+    }
+
+    // Frames come by decoding on; what lies elsewhere by seeking, believed only if the frame that
+    // comes has the time of the one wanted, else by decoding from the start.
+    cv::Mat decoded(int index) {
+        last_ = -1;
+        const int ahead = index - next_;
+        if (!((ahead >= 0 && ahead <= kFew) || seek(index))) restart();
+        for (; next_ <= index; ++next_)
+            if (!capture_.grab()) {
+                next_ = size();  // nowhere known: the next frame is sought anew
+                throw DecodeError(where(index) + ": cannot decode, truncated or changed");
+            }
+        cv::Mat image;
+        if (!capture_.retrieve(image)) throw DecodeError(where(index) + ": cannot decode");
+        return image.clone();
+    }
+
+    // Goes to before a frame; false where the file does not lead there.
+    bool seek(int index) {
+        if (!times || index == 0) return false;
+        // To the frame before it: the time of what is grabbed there tells where we are.
+        capture_.set(cv::CAP_PROP_POS_FRAMES, index - 1);
+        if (!capture_.grab()) return false;
+        const double time = capture_.get(cv::CAP_PROP_POS_MSEC) / 1e3;
+        next_ = index;
+        return std::abs(time - (*times)[static_cast<std::size_t>(index - 1)]) < 1e-6;
+    }
+
+    Path path_;
+    cv::VideoCapture capture_;
+    bool gray_ = false;
+    std::vector<double> frame_times_;
+    int next_ = 0, last_ = -1;
+    cv::Mat last_image_;
+};
+
+}  // namespace
+
+bool holds_gray(double format_code) {
+    const auto code = static_cast<std::uint32_t>(static_cast<std::int64_t>(format_code));
+    for (const char* gray : {"Y800", "GREY", "Y16 "}) {
+        std::uint32_t known = 0;
+        std::memcpy(&known, gray, 4);
+        if (code == known) return true;
+    }
+    return code == 0x10003159;  // FFmpeg's 16-bit little-endian gray: "Y1", 0, 16
+}
+
+StreamPointer open_video(const Path& path) { return std::make_shared<Video>(path); }
+
+}  // namespace xcalib::cli

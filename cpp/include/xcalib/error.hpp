@@ -1,0 +1,16 @@
+// What is thrown where input cannot be used.
+#pragma once
+
+#include <stdexcept>
+
+#include "xcalib/export.hpp"
+
+namespace XCALIB_EXPORT xcalib {
+
+// A file, a folder or an argument that cannot be used; the message names it, and what was expected.
+class InputError : public std::invalid_argument {
+   public:
+    using std::invalid_argument::invalid_argument;
+};
+
+}  // namespace xcalib

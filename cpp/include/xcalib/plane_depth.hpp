@@ -1,0 +1,40 @@
+// Depth from a prior on the road: a flat one under the camera, and everything else far away.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "xcalib/calibrate.hpp"
+#include "xcalib/error.hpp"
+#include "xcalib/export.hpp"
+#include "xcalib/image.hpp"
+
+namespace XCALIB_EXPORT xcalib {
+
+// D(x, y) = camera_height * fy / r(x, y), where r is the distance of a pixel below the horizon
+// [px], never beyond `far`, which is also the depth at and above the horizon.
+struct PlaneDepth {
+    double camera_height = 1.6;  // of the reference camera above the road [m], > 0
+    double horizon = 0.5;        // its row in the middle column, of the image height from the top,
+                                 // (-1, 1)
+    double far = 60.0;           // largest depth [m], > 0
+    double hfov_deg = 45.0;      // of the reference camera, (0, 180); pixels are square
+    double roll_deg = 0.0;       // how far the horizon falls towards the right, (-45, 45)
+
+    void validate() const;  // throws InputError: field, value, range
+    Image operator()(int width, int height) const;
+};
+
+// Of `count` frames, those that judge a plane: at most a dozen, evenly spread.
+std::vector<int> frames_to_judge_plane(int count);
+
+// The plane near `plane` whose best rig aligns most edges: a horizon that is a few pixels off bends
+// the depth of the far road, where it is largest, and no rig makes up for it, so the NEC that a fit
+// reaches tells. Height, far distance and field of view are kept: the height scales depth and
+// translation alike, and the images do not change. `rig`: fitted with `plane`, where fits start.
+// `options`: known cameras and threads are kept. `tell` is called after each fit.
+PlaneDepth fit_plane(const std::vector<ImageView>& references,
+                     const std::vector<ImageView>& sources, const PlaneDepth& plane, const Rig& rig,
+                     const CalibrationOptions& options, const std::function<void()>& tell);
+
+}  // namespace xcalib
