@@ -1,5 +1,7 @@
+#include <CLI/CLI.hpp>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "commands.hpp"
@@ -167,15 +169,15 @@ CalibrationResult calibrated(const Frames& frames, const Loaded& loaded,
 }
 
 Json json_of(const CalibrationReport& report) {
-    constexpr double kDegrees = 180 / 3.14159265358979323846;
+    constexpr double kDegree = 3.14159265358979323846 / 180;
     Json candidates = Json::array(), levels = Json::array(), steps = Json::array();
     for (const CandidateReport& c : report.candidates)
         candidates.push_back({{"score", number(c.score)},
                               {"correlation", number(c.correlation)},
                               {"overlap", number(c.overlap)},
                               {"refined_nec", number(c.refined_nec)},
-                              {"reference_hfov_deg", number(c.refined.reference.hfov() * kDegrees)},
-                              {"source_hfov_deg", number(c.refined.source.hfov() * kDegrees)}});
+                              {"reference_hfov_deg", number(c.refined.reference.hfov() / kDegree)},
+                              {"source_hfov_deg", number(c.refined.source.hfov() / kDegree)}});
     for (const LevelReport& l : report.levels)
         levels.push_back({{"factor", l.factor},
                           {"stage", l.stage},

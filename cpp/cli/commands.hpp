@@ -1,9 +1,11 @@
 // The commands: each adds itself to the command line, with what it does.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
 #include "console.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace xcalib::cli {
 

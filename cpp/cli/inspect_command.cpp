@@ -1,3 +1,6 @@
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
 #include "commands.hpp"
 #include "files.hpp"
 #include "xcalib/describe.hpp"
@@ -8,7 +11,7 @@ namespace xcalib::cli {
 namespace {
 
 Json json_of(const Pinhole& camera) {
-    constexpr double kDegrees = 180 / 3.14159265358979323846;
+    constexpr double kDegree = 3.14159265358979323846 / 180;
     return {{"width", camera.width},
             {"height", camera.height},
             {"fx", camera.fx},
@@ -16,8 +19,8 @@ Json json_of(const Pinhole& camera) {
             {"cx", camera.cx},
             {"cy", camera.cy},
             {"skew", camera.skew},
-            {"hfov_deg", camera.hfov() * kDegrees},
-            {"vfov_deg", camera.vfov() * kDegrees}};
+            {"hfov_deg", camera.hfov() / kDegree},
+            {"vfov_deg", camera.vfov() / kDegree}};
 }
 
 template <class Vector>

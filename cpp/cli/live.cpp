@@ -1,5 +1,6 @@
 #include <chrono>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "capture.hpp"
 #include "depth.hpp"

@@ -1,8 +1,10 @@
 // xcalib-cli: the Python command's work on rigs without Python, on the same core.
+#include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <system_error>
 

@@ -1,12 +1,16 @@
 // The arguments that commands share, as on the Python command line.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <initializer_list>
 #include <optional>
 #include <string>
 
 #include "xcalib/complete_depth.hpp"
 #include "xcalib/plane_depth.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace xcalib::cli {
 

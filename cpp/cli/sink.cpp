@@ -101,13 +101,15 @@ class VideoSink : public Sink {
                                  ".partial" + path.extension().string());
         const std::string& codec = kCodecs.at(suffix);
         File file{partial, {}, image.size(), image.type()};
+        std::vector<int> properties{cv::VIDEOWRITER_PROP_IS_COLOR, image.channels() == 3};
+        // OpenCV 4.6 does not know of depths, and so refuses 16 bits.
+        if (deep) properties.insert(properties.end(), {cv::VIDEOWRITER_PROP_DEPTH, CV_16U});
         file.writer.open(partial.string(), cv::CAP_FFMPEG,
                          cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]), rate_,
-                         image.size(),
-                         {cv::VIDEOWRITER_PROP_IS_COLOR, image.channels() == 3,
-                          cv::VIDEOWRITER_PROP_DEPTH, deep ? CV_16U : CV_8U});
+                         image.size(), properties);
         if (!file.writer.isOpened())
-            throw InputError(path.string() + ": this OpenCV cannot write " + codec + " video");
+            throw InputError(path.string() + ": this OpenCV cannot write " + codec + " video of " +
+                             kind_of(image) + " images");
         return file;
     }
 

@@ -11,11 +11,16 @@ namespace {
 // Frames ahead that are reached by decoding on rather than by seeking.
 constexpr int kFew = 64;
 
+// FFmpeg's 16-bit little-endian gray: "Y1", 0, 16.
+constexpr std::uint32_t kGray16 = 0x10003159;
+
 class Video : public Stream {
    public:
     explicit Video(Path path) : path_(std::move(path)) {
         open();
-        gray_ = holds_gray(capture_.get(cv::CAP_PROP_CODEC_PIXEL_FORMAT));
+        const double format = capture_.get(cv::CAP_PROP_CODEC_PIXEL_FORMAT);
+        gray_ = holds_gray(format);
+        deep_ = gray_ && static_cast<std::int64_t>(format) == kGray16;
         const int announced = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_COUNT));
         while (capture_.grab()) frame_times_.push_back(capture_.get(cv::CAP_PROP_POS_MSEC) / 1e3);
         // Containers estimate their length to a frame or so; a file cut short lacks more.
@@ -79,6 +84,14 @@ class Video : public Stream {
             }
         cv::Mat image;
         if (!capture_.retrieve(image)) throw DecodeError(where(index) + ": cannot decode");
+        if (gray_ && image.channels() == 3) {
+            // OpenCV before 4.8 turns gray to colour all the same, 8 bits of it.
+            if (deep_)
+                throw InputError(path_.string() +
+                                 ": 16-bit gray, of which this OpenCV decodes 8 bits; the Python"
+                                 " command, `xcalib`, reads all, and folders of images do here");
+            cv::extractChannel(image, image, 0);
+        }
         return image.clone();
     }
 
@@ -95,7 +108,7 @@ class Video : public Stream {
 
     Path path_;
     cv::VideoCapture capture_;
-    bool gray_ = false;
+    bool gray_ = false, deep_ = false;
     std::vector<double> frame_times_;
     int next_ = 0, last_ = -1;
     cv::Mat last_image_;
@@ -110,7 +123,7 @@ bool holds_gray(double format_code) {
         std::memcpy(&known, gray, 4);
         if (code == known) return true;
     }
-    return code == 0x10003159;  // FFmpeg's 16-bit little-endian gray: "Y1", 0, 16
+    return code == kGray16;
 }
 
 StreamPointer open_video(const Path& path) { return std::make_shared<Video>(path); }
