@@ -20,6 +20,8 @@ export CXX
 
 BUILD_PACKAGES := ccache cmake g++ libceres-dev libeigen3-dev libhwy-dev libopencv-dev libyaml-cpp-dev make \
     ninja-build python3-dev python3-venv
+# What xcalib-cli needs besides.
+CLI_PACKAGES := libcli11-dev nlohmann-json3-dev
 TEST_PACKAGES := clang-format libgtest-dev pkg-config
 BENCH_PACKAGES := libbenchmark-dev
 # The cross compiler's own libraries, and an emulator: no foreign architecture is added to dpkg.
@@ -31,7 +33,8 @@ CPP_FILES = $(shell find bench/cpp cpp examples tests -name '*.[ch]' -o -name '*
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
     $(shell find cmake cpp python -type f -not -path '*/__pycache__/*')
 
-.PHONY: help demo test lint test-cpp test-sdist test-python test-aarch64 sanitize packages format stub clean
+.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 sanitize packages format stub \
+    clean
 help:
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
 
@@ -46,7 +49,7 @@ test: lint test-cpp test-sdist test-python ## every check and test, C++ and Pyth
 build-packages:
 	@scripts/install_packages.sh $(BUILD_PACKAGES)
 test-packages: | build-packages
-	@scripts/install_packages.sh $(TEST_PACKAGES)
+	@scripts/install_packages.sh $(TEST_PACKAGES) $(CLI_PACKAGES)
 bench-packages: | build-packages
 	@scripts/install_packages.sh $(BENCH_PACKAGES)
 
@@ -112,7 +115,7 @@ test-aarch64: | aarch64-packages ## the registrar for 64-bit ARM, its tests unde
 	$(call preset,aarch64)
 
 packages: | build-packages ## Debian packages, into build/packages
-	@scripts/install_packages.sh dpkg-dev
+	@scripts/install_packages.sh dpkg-dev $(CLI_PACKAGES)
 	cmake --preset packages
 	cmake --build --preset packages
 	cd build/packages && cpack
@@ -130,8 +133,12 @@ build/sdist/.tested: $(WHEEL_FILES) $(VENV)/.test-requires | $(VENV)/.installed
 	    'import pathlib, xcalib; assert pathlib.Path(xcalib.__file__).is_relative_to(pathlib.Path.cwd())'
 	touch $@
 
+cli: | test-packages ## the command without Python, into build/release/cpp/cli
+	cmake --preset release -DXCALIB_WERROR=$(WERROR)
+	cmake --build --preset release --target xcalib-cli
+
 # From the tests' folder: the package they import is the installed one.
-test-python: $(VENV)/.installed $(VENV)/.test-requires ## Python tests, on the installed package
+test-python: $(VENV)/.installed $(VENV)/.test-requires cli ## Python tests, on the installed package
 	cd tests && ../$(BIN)/python -m pytest -n auto --dist loadfile
 
 # -- Figures --------------------------------------------------------------------------------------

@@ -749,6 +749,9 @@ class PlaneDepth:
     @property
     def roll_deg(self) -> float:
         """How far the horizon falls towards the right [deg], (-45, 45)."""
+    @property
+    def parallel(self) -> bool:
+        """Several threads may ask for depth at a time."""
     def __call__(self, index: int, reference: NDArray[Any]) -> NDArray[float32]:
         """Depth of any frame: (H, W) float32 [m], of the reference image's size."""
 
