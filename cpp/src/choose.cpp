@@ -198,8 +198,8 @@ cv::Mat correlation(const std::vector<cv::Mat>& a, const std::vector<cv::Mat>& b
         else sum += product;
     }
     cv::Mat out;
-    cv::dft(sum, out, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-    if (out.channels() == 2) cv::extractChannel(out, out, 0);
+    cv::dft(sum, out, cv::DFT_INVERSE | cv::DFT_SCALE);
+    if (out.channels() == 2) cv::extractChannel(out, out, 0);  // Re conj(z_R) z_S
     return out;
 }
 
