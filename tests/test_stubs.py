@@ -68,6 +68,8 @@ def stubbed(body: list[ast.stmt], prefix: str = "") -> Iterator[tuple[str, Name]
             yield prefix + node.name, Name("class", (), one_line(ast.get_docstring(node)))
             yield from stubbed(node.body, f"{prefix}{node.name}.")
         elif isinstance(node, ast.FunctionDef):
+            if node.name.startswith("_") and node.name != "__init__":
+                continue
             is_property = any(ast.unparse(item) == "property" for item in node.decorator_list)
             kind, names = ("property", ()) if is_property else ("function", parameters(node.args))
             yield prefix + node.name, Name(kind, names, one_line(ast.get_docstring(node)))

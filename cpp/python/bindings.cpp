@@ -271,7 +271,8 @@ PYBIND11_MODULE(_core, m) {
         }
     });
 
-    py::register_exception<InputError>(m, "InputError", PyExc_ValueError);
+    py::register_exception<InputError>(m, "InputError", PyExc_ValueError).attr("__doc__") =
+        "Input that cannot be used; the message names the file or argument and what was expected.";
 
     py::class_<Pinhole>(m, "Pinhole", R"(A pinhole camera, Eq. (intrinsic) of the paper.
 

@@ -5,7 +5,8 @@ from typing import Any
 from numpy import float32, float64, intp, uint8
 from numpy.typing import ArrayLike, NDArray
 
-class InputError(ValueError): ...
+class InputError(ValueError):
+    """Input that cannot be used; the message names the file or argument and what was expected."""
 
 class Pinhole:
     """A pinhole camera, Eq. (intrinsic) of the paper.
