@@ -96,7 +96,7 @@ def assert_same_pixels(first: Path, second: Path, count: int = FRAMES) -> None:
         ("--frames", 3, "--seed", 2, "--explain"),
         ("--choose", "spread", "--frames", 3, "--seed", 5),
         ("--search", "off", "--flow", "patch", "--reference-hfov", 50),
-        ("--solver", "adam", "--threads", 1),
+        ("--solver", "adam", "--frames", 2),
         ("--source-intrinsics", "277,278,105,85.5", "--optimize-reference"),
     ],
 )
