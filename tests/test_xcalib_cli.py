@@ -547,7 +547,7 @@ def live(
                 except BrokenPipeError:
                     return
                 if isinstance(stream, list):
-                    time.sleep(0.5)
+                    time.sleep(5)
 
     feeder = threading.Thread(target=write)
     feeder.start()
@@ -601,7 +601,7 @@ def test_live_takes_the_latest_map_and_stops_where_asked(
 ) -> None:
     height, width = read_image(list_files(rendered / "visible")[0]).shape[:2]
     ones = np.full((height // 2, width // 2), 2560, np.uint16)
-    # The pipe stays open, and silent, for half a second: the one map is used again.
+    # The pipe stays open, and silent: the one map is used again.
     result = live(
         *(binary, cameras, [packed(ones, 7)], rendered / "rig.yaml"),
         *("-o", tmp_path / "live", "--frames", 3, "--json"),
