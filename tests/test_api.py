@@ -260,7 +260,7 @@ def test_options_of_the_wrong_type_are_errors() -> None:
         ({"search": SearchOptions(min_overlap=0.0)}, "search.min_overlap = 0"),
         ({"search": SearchOptions(candidates=0)}, "search.candidates = 0"),
     ],
-    ids=str,
+    ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_validation_names_field_value_and_range(changed: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=f"{message}.*expected|{message}"):
