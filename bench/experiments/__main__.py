@@ -42,10 +42,12 @@ def main() -> None:
     )
     parser.add_argument("--results", type=Path, default=ROOT / "build" / "results")
     parser.add_argument("--part", help="of an experiment that has parts; default: all")
+    parser.add_argument("--minutes", type=float, help="begin no further rig after that long")
     args = parser.parse_args()
     print(machine())
-    results = Results(args.results, args.experiment, args.quick)
     start = time.perf_counter()
+    deadline = start + 60 * args.minutes if args.minutes else float("inf")
+    results = Results(args.results, args.experiment, args.quick, deadline)
     importlib.import_module(EXPERIMENTS[args.experiment]).run(results, args.part)
     print(f"{time.perf_counter() - start:.0f} s, results in {args.results}")
 

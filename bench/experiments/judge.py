@@ -23,6 +23,8 @@ class Judged:
     patches: metrics.PatchResidual
     valid: float
     """Share of the pixels judged."""
+    whole: dict[str, float]
+    """Of the source only resized, over the whole frame with its rim."""
     epe: np.ndarray
     """End-point errors [px of the reference] where the truth is known, of the judged pixels."""
 
@@ -51,6 +53,7 @@ def judge(
         inside &= mask
     inside = cv2.erode(inside.astype(np.uint8), EROSION, borderValue=0) > 0
     plain = cv2.resize(source, reference.shape[::-1])
+    whole = {name: score(reference, plain) for name, score in METRICS.items()}
     epe = np.empty(0, np.float32)
     if truth is not None:
         error = np.linalg.norm(at - truth, axis=-1) * scale
@@ -58,13 +61,13 @@ def judge(
     empty = np.empty((0, 2), np.float32)
     if inside.mean() < 0.01:  # nothing is left to judge: a failure that must not vanish
         nothing = dict.fromkeys(METRICS, 0.0)
-        before = {name: score(reference, plain) for name, score in METRICS.items()}
-        return Judged(before, nothing, metrics.PatchResidual(empty, empty), 0.0, epe)
+        return Judged(whole, nothing, metrics.PatchResidual(empty, empty), 0.0, whole, epe)
     return Judged(
         {name: score(reference, plain, inside) for name, score in METRICS.items()},
         {name: score(reference, registered, inside) for name, score in METRICS.items()},
         metrics.patch_residual(reference, registered, inside),
         float(inside.mean()),
+        whole,
         epe,
     )
 

@@ -109,8 +109,8 @@ def run(results: Results, part: str | None) -> None:
          "pairs with the best value at 0"],
         rows,
         f"{len(values)} pairs of RoadScene, {STEPS} steps of 4 px between the images. Losses are of"
-        " the mean curve over the size of its value at 0 (RMSE: of its reciprocal); the width is of the mean"
-        " curve, both sides, half way down to its mean beyond 40 px.",
+        " the mean curve over the size of its value at 0 (RMSE: of its reciprocal); the width is of"
+        " the mean curve, both sides, half way down to its mean beyond 40 px.",
     )  # fmt: skip
 
     def draw(figure) -> None:

@@ -5,10 +5,15 @@ import io
 import os
 import re
 import subprocess
+import time
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from common import ROOT, machine
+
+T = TypeVar("T")
 
 DOCS = ROOT / "docs" / "results.md"
 PLOTS = ROOT / "docs" / "images" / "results"
@@ -25,7 +30,7 @@ def package() -> str:
     """The machine, and the last commit of what is measured."""
     log = ["git", "-C", str(ROOT), "log", "-1", "--format=%h", "--", "cpp", "python"]
     commit = subprocess.run(log, capture_output=True, text=True).stdout.strip()
-    return f"{machine().partition(', commit')[0]}; package as of {commit or 'unknown'}"
+    return f"{machine().partition(', commit')[0]}; package as of commit {commit or 'unknown'}"
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,16 @@ class Results:
     folder: Path
     experiment: str
     quick: bool
+    deadline: float = float("inf")
+    """Of `time.perf_counter`: no further rig is begun then."""
+
+    def in_time(self, rigs: Iterable[T]) -> Iterator[T]:
+        """The rigs until time is up; at least one."""
+        for done, rig in enumerate(rigs):
+            if done and time.perf_counter() > self.deadline:
+                print(f"stopped after {done}: time is up")
+                return
+            yield rig
 
     def of(self, full, quick):
         """The one or the other, by how much is asked for."""
