@@ -105,7 +105,7 @@ def rendered_part(results: Results) -> None:
     seconds = {label: [] for label in variants}
     count = results.of(15, 1)
     # By turns, so that both kinds are alike in number whenever time is up.
-    turns = zip(random_rigs(count, frames), random_rigs(count, frames, **NEAR), strict=True)
+    turns = zip(*(random_rigs(count, frames, results.quick, **k) for k in ({}, NEAR)), strict=True)
     for scenes in results.in_time(turns):
         for name, scene in zip(("any", "near"), scenes, strict=True):
             for label, variant in variants.items():

@@ -119,7 +119,7 @@ def displacement(results: Results) -> None:
         rows,
         f"{done} rendered rig{'s' * (done > 1)} of 320x240 in each cell, 4 frames, baseline"
         f" {BASELINE:g} m, roll within 2 deg; found: median end-point error under {LIMIT:g} px."
-        " Ratio of tangents, source to reference (50 deg); displacement in widths, in any direction.",
+        " Ratio of tangents, source to reference (50 deg); displacement in widths, any direction.",
     )
     results.plot(
         "displacement",

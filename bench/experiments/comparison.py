@@ -234,7 +234,7 @@ def rendered_part(results: Results) -> None:
     fit, held = slice(0, results.of(8, 2)), slice(results.of(8, 2), results.of(11, 3))
     count = results.of(10, 1)
     done = 0
-    for scene in results.in_time(random_rigs(count, held.stop, **NEAR)):
+    for scene in results.in_time(random_rigs(count, held.stop, results.quick, **NEAR)):
         done += 1
         one_depth = np.full_like(scene.depths, 20.0)
         fits = {HOMOGRAPHY: (one_depth, {}), ADAM: (scene.depths, {"solver": "adam"}),
@@ -277,7 +277,7 @@ def rendered_part(results: Results) -> None:
                 label,
                 f"{np.median(epe):.2f}",
                 f"{np.mean(epe < 1):.0%}",
-                *rows[label].cells((320, 240)),
+                *rows[label].cells(scene.references.shape[2:0:-1]),
             ]
         )
     results.table(

@@ -99,7 +99,9 @@ def end_points(scene: Rendered, rig: xcalib.Rig, depths: np.ndarray) -> np.ndarr
 def run(results: Results, part: str | None) -> None:
     changes = dict(list(CHANGES.items())[: results.of(None, 2)])
     found = {label: [] for label in changes}
-    for seed, scene in enumerate(results.in_time(random_rigs(results.of(6, 1), 4, **NEAR))):
+    for seed, scene in enumerate(
+        results.in_time(random_rigs(results.of(6, 1), 4, results.quick, **NEAR))
+    ):
         for label, change in changes.items():
             rng = np.random.default_rng(seed)
             depths = np.stack([change(d, rng) for d in scene.depths]).astype(np.float32)

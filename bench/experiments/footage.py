@@ -65,9 +65,11 @@ def rendered(rig: xcalib.Rig, frames: int, seed: int, night: bool = False) -> Re
         return Rendered(rig, arrays["references"], arrays["sources"], arrays["depths"])
 
 
-def random_rigs(count: int, frames: int, **limits):
+def random_rigs(count: int, frames: int, quick: bool, **limits):
     """Random rigs of small images, every third by night; `limits` as of `synthetic.random_rig`."""
     sizes = (WIDTH, HEIGHT, SOURCE_WIDTH, SOURCE_HEIGHT)
+    if quick:
+        sizes = tuple(side // 2 for side in sizes)
     for seed in range(count):
         rig = synthetic.random_rig(seed, *sizes, **limits)
         yield rendered(rig, frames, seed, night=seed % 3 == 2)

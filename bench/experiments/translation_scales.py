@@ -22,7 +22,7 @@ def random_start(rng: np.random.Generator) -> xcalib.Rig:
 
 def run(results: Results, part: str | None) -> None:
     frames = results.of(8, 2)
-    scene = next(iter(random_rigs(1, frames, **NEAR)))
+    scene = next(iter(random_rigs(1, frames, results.quick, **NEAR)))
     epochs = results.of(120 * 4 // frames, 1)  # the paper's 120 steps
     rng = np.random.default_rng(0)
     starts = [random_start(rng) for _ in range(results.of(10, 1))]
