@@ -1,6 +1,6 @@
 """The paper's experiments on data at hand, and three more: one command each.
 
-    python bench/experiments 1            # 1 to 9, or "rest": what is left of the residual
+    python bench/experiments 1            # 1 to 9, "rest" (what is left of the residual), or "all"
     python bench/experiments 3 --quick    # seconds, on next to nothing: only to see that it runs
 
 Tables (Markdown, CSV) and plots go to a results folder; a full run also rewrites its tables between
@@ -36,20 +36,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("experiment", choices=EXPERIMENTS)
+    parser.add_argument("experiment", choices=[*EXPERIMENTS, "all"])
     parser.add_argument(
         "--quick", action="store_true", help="a tiny setting; docs stay as they are"
     )
     parser.add_argument("--results", type=Path, default=ROOT / "build" / "results")
     parser.add_argument("--part", help="of an experiment that has parts; default: all")
-    parser.add_argument("--minutes", type=float, help="begin no further rig after that long")
+    parser.add_argument("--minutes", type=float, help="begin no further rig after so long, in each")
     args = parser.parse_args()
     print(machine())
-    start = time.perf_counter()
-    deadline = start + 60 * args.minutes if args.minutes else float("inf")
-    results = Results(args.results, args.experiment, args.quick, deadline)
-    importlib.import_module(EXPERIMENTS[args.experiment]).run(results, args.part)
-    print(f"{time.perf_counter() - start:.0f} s, results in {args.results}")
+    for name in EXPERIMENTS if args.experiment == "all" else [args.experiment]:
+        start = time.perf_counter()
+        deadline = start + 60 * args.minutes if args.minutes else float("inf")
+        results = Results(args.results, name, args.quick, deadline)
+        importlib.import_module(EXPERIMENTS[name]).run(results, args.part)
+        print(f"{time.perf_counter() - start:.0f} s, results in {args.results}")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,9 @@ from xcalib.depth.conditioning import SteadyDepth
 NOISE, FLICKER = 0.05, 0.03
 """Of depth: smooth and new in each frame, and of the whole frame; relative."""
 
+SKY = 200.0
+"""Its depth [m]: as a network would give one. Holes would be flow's own trouble."""
+
 
 class Drive(synthetic.Street):
     """A street passed at so many metres a frame, its own frames being 6 m apart."""
@@ -99,7 +102,7 @@ def run(results: Results, part: str | None, flow: Callable = dis) -> None:
     count = results.of(12, 2)
     rig = synthetic.demo_rig().resized(WIDTH, HEIGHT, SOURCE_WIDTH, SOURCE_HEIGHT)
     for name, drive in list(DRIVES.items())[: results.of(None, 1)]:
-        street = Drive(rig, count, drive["metres"], seed=5, night=drive["night"])
+        street = Drive(rig, count, drive["metres"], seed=5, night=drive["night"], sky_depth=SKY)
         frames = [street.frame(i) for i in range(count)]
         rng = np.random.default_rng(1)
         depths = [noisy(f.depth, rng) for f in frames]
