@@ -66,6 +66,20 @@ def robust_fit(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return solution
 
 
+def neighbours(frames: list[Patches], distance: int) -> tuple[float, float]:
+    """Correlation of x and of y shifts of patches so far apart along or across [px]."""
+    first, second = [], []
+    for p in frames:
+        small = np.hypot(*p.shift.T) < 6
+        at, shift = p.at[small], (p.shift - np.median(p.shift, axis=0))[small]
+        apart = np.abs(at[:, None] - at[None]).max(axis=-1)
+        i, j = np.nonzero(np.abs(apart - distance) < 4)
+        first.append(shift[i])
+        second.append(shift[j])
+    a, b = np.concatenate(first), np.concatenate(second)
+    return tuple(float(np.corrcoef(a[:, k], b[:, k])[0, 1]) for k in (0, 1))
+
+
 def own_noise(results: Results) -> list[str]:
     """What the measure says of rendered nights of that size, registered by the true rig."""
     rig = synthetic.demo_rig().resized(583, 473, 579, 477)
@@ -135,13 +149,23 @@ def run(results: Results, part: str | None) -> None:
     rows.append(own_noise(results))
     results.table(
         "corrections",
-        ["what is taken away", "median [px]", "< 2 px", "|x| [px]", "|y| [px]", "systematic [px]",
+        ["what is taken away", "median [px]", "< 2 px", "x [px]", "y [px]", "systematic [px]",
          "patches"],
         rows,
-        f"Patch residual of {len(held)} unseen frames, fitted on {len(fit)}, filled stereo depth.",
+        f"Patch residual of {len(held)} unseen frames, fitted on {len(fit)}, filled stereo depth; x and y are"
+        " medians of lengths.",
     )  # fmt: skip
 
     every = fitted + judged
+    distances = (32, 64, 96, 128, 192)
+    likeness = [neighbours(every, distance) for distance in distances]
+    results.table(
+        "neighbours",
+        ["", *(f"{d} px apart" for d in distances)],
+        [[f"of {name}", *(f"{c[k]:.2f}" for c in likeness)] for k, name in enumerate("xy")],
+        f"Correlation of the shifts of two patches of one frame, less the frame's median, of shifts"
+        f" under 6 px; {len(every)} frames. Patches are 48 px wide: those 32 px apart overlap.",
+    )
     shift = np.concatenate([p.shift for p in every])
     length = np.hypot(*shift.T)
     groups = []
@@ -167,5 +191,5 @@ def run(results: Results, part: str | None) -> None:
         ["by", "lowest quarter", "second", "third", "highest quarter"],
         groups,
         f"Median patch residual [px] over all {len(every)} frames, in quarters of the patches; in"
-        " brackets of |x| and |y|; then the values that bound the quarter.",
+        " brackets of its lengths in x and y; then the values that bound the quarter.",
     )
