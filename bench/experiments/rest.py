@@ -137,7 +137,7 @@ def run(results: Results, part: str | None) -> None:
     for label, degree, by_depth in (
         ("its own shift (vibration, time): bound", 0, False),
         ("its own affine (rolling shutter, turns): bound", 1, False),
-        ("its own shift and terms by inverse depth (motion between exposures): bound", 0, True),
+        ("its own shift and terms by inverse depth (motion): bound", 0, True),
     ):
         own = [basis(p, size, degree, by_depth) for p in judged]
         row(
@@ -152,8 +152,8 @@ def run(results: Results, part: str | None) -> None:
         ["what is taken away", "median [px]", "< 2 px", "x [px]", "y [px]", "systematic [px]",
          "patches"],
         rows,
-        f"Patch residual of {len(held)} unseen frames, fitted on {len(fit)}, filled stereo depth; x and y are"
-        " medians of lengths.",
+        f"Patch residual of {len(held)} unseen frames, fitted on {len(fit)}, filled stereo depth; x"
+        " and y are medians of lengths.",
     )  # fmt: skip
 
     every = fitted + judged
