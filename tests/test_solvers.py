@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import xcalib
 from conftest import run
-from xcalib import AdamOptions, CalibrationOptions, Pinhole, Rig, SearchOptions, synthetic
+from xcalib import AdamOptions, CalibrationOptions, Pinhole, Rig, SearchOptions, _core, synthetic
 
 Floats = NDArray[np.float32]
 
@@ -210,3 +210,38 @@ def test_bad_options(scene: Path, more: tuple[str, ...], named: str) -> None:
     assert result.exit_code == 2
     assert named in result.stderr
     assert not (scene / "out.yaml").exists()
+
+
+# -- Parts of the method off, for ablation studies -------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("part", "steps"),
+    [
+        ("pyramid", {(1, 1), (1, 2)}),
+        ("stages", {(4, 2), (2, 2), (1, 2)}),
+    ],
+)
+def test_a_schedule_without_a_part(
+    frames: list[synthetic.Frame], part: str, steps: set[tuple[int, int]]
+) -> None:
+    parts = _core._Parts(**{part: False})
+    result = calibrate(frames[:2], search=SearchOptions(candidates=1), _parts=parts)
+    assert {(level.factor, level.stage) for level in result.report.levels} == steps
+
+
+def test_without_images_and_flow_a_rig_stays_as_it_was_given(
+    truth: Rig, frames: list[synthetic.Frame]
+) -> None:
+    result = xcalib.calibrate(
+        [frame.reference for frame in frames[:2]],
+        [frame.source for frame in frames[:2]],
+        [frame.depth for frame in frames[:2]],
+        initial=truth,
+        options=CalibrationOptions(
+            search=SearchOptions(mode="off"),
+            flow="off",
+            _parts=_core._Parts(images=False),
+        ),
+    )
+    assert error(result.rig, truth, frames) < 1e-6

@@ -417,6 +417,16 @@ A rig that was calibrated with it has its translation in the unit that the scale
         .def_readwrite("translation_scales", &AdamOptions::translation_scales,
                        "Of Eq. (translation), 1 to 3.");
 
+    py::class_<Parts>(m, "_Parts", "Parts of the method, for ablation studies: all belong on.")
+        .def(py::init(&options_from<Parts>))
+        .def_readwrite("images", &Parts::images)
+        .def_readwrite("pyramid", &Parts::pyramid)
+        .def_readwrite("stages", &Parts::stages)
+        .def_readwrite("floor", &Parts::floor)
+        .def_readwrite("pair_weights", &Parts::pair_weights)
+        .def_readwrite("normalization", &Parts::normalization)
+        .def_readwrite("depth_edges", &Parts::depth_edges);
+
     py::class_<CalibrationOptions>(m, "CalibrationOptions",
                                    "Options of calibrate(). Keyword arguments set fields.")
         .def(py::init(&options_from<CalibrationOptions>))
@@ -461,6 +471,7 @@ A rig that was calibrated with it has its translation in the unit that the scale
             },
             "'ceres', or 'adam' as published, which searches nothing.")
         .def_readwrite("adam", &CalibrationOptions::adam, "AdamOptions.")
+        .def_readwrite("_parts", &CalibrationOptions::parts)
         .def("validate", &CalibrationOptions::validate,
              "Raises ValueError naming the field, its value and the allowed range.");
 

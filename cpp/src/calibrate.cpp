@@ -51,7 +51,8 @@ void search_and_refine(const WorkingImages& images, const ImageView& reference,
     // The middle levels decide; what the coarse one leaves they find, and at the finest a step
     // costs most.
     const auto tolerance = [](int factor) { return factor == 2 ? 1e-6 : 1e-5; };
-    const std::vector<Step> steps = schedule(report.working_width, report.working_height);
+    const std::vector<Step> steps =
+        schedule(report.working_width, report.working_height, options.parts);
     for (std::size_t s = 0; s < steps.size(); ++s) {
         if (steps[s].stage == 1) continue;
         const Level level = make_level(images, steps[s].factor, result.rig, options.num_threads);
@@ -178,8 +179,7 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
     report.frames =
         choose_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
     tell("prepare", 0.0);
-    WorkingImages images = make_working_images(references, sources, depths, report.frames,
-                                               options.working_width, options.num_threads);
+    WorkingImages images = make_working_images(references, sources, depths, report.frames, options);
     report.working_width = images.references[0].width;
     report.working_height = images.references[0].height;
 

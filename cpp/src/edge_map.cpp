@@ -5,7 +5,6 @@
 
 #include "mat.hpp"
 #include "xcalib/gray.hpp"
-#include "xcalib/nec.hpp"
 
 namespace xcalib {
 namespace {
@@ -25,9 +24,9 @@ cv::Mat as_mat(const EdgeMap& map) {
 
 }  // namespace
 
-EdgeMap edge_map(const Image& image) {
+EdgeMap edge_map(const Image& image, float floor) {
     const Image smooth = gaussian_blur(image, kBlur);
-    const EdgeField field = edge_field(smooth, mean_gradient(smooth, nullptr));
+    const EdgeField field = edge_field(smooth, mean_gradient(smooth, nullptr), floor);
     EdgeMap full = sized(image.width, image.height);
     for (std::size_t i = 0; i < full.z.size(); ++i) {
         const float x = field.x[i], y = field.y[i];

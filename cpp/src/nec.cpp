@@ -65,8 +65,8 @@ double nec(const Image& reference, const Image& registered, const std::uint8_t* 
     return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : std::numeric_limits<double>::quiet_NaN();
 }
 
-EdgeField edge_field(const Image& image, float mean_magnitude) {
-    const float floor = kEdgeFloor * mean_magnitude, cap = kEdgeCap * mean_magnitude;
+EdgeField edge_field(const Image& image, float mean_magnitude, float relative_floor) {
+    const float floor = relative_floor * mean_magnitude, cap = kEdgeCap * mean_magnitude;
     EdgeField field{image.width, image.height, {}, {}};
     field.x.assign(image.pixels.size(), 0.0f);
     field.y.assign(image.pixels.size(), 0.0f);
@@ -107,9 +107,10 @@ float mean_gradient(const Image& image, const std::uint8_t* validity) {
 }
 
 NecFrame make_nec_frame(const Image& reference, const Image& source, const Image& depth,
-                        const Rig& rig) {
+                        const Rig& rig, float floor) {
     NecFrame frame;
-    frame.reference = edge_field(reference, mean_gradient(reference, nullptr));
+    frame.floor = floor;
+    frame.reference = edge_field(reference, mean_gradient(reference, nullptr), floor);
     frame.depth = depth;
     frame.source = source;
     const WarpedImage warped = warp(rig, source, depth);

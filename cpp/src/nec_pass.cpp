@@ -240,7 +240,7 @@ void for_each_row(const NecFrame& frame, const Rig& rig, const Parameters& param
         std::copy_n(frame.reference.x.data() + offset, width, reference_x.data());
         std::copy_n(frame.reference.y.data() + offset, width, reference_y.data());
         work(Stencil{&rows[(y - 1) % 3], &rows[y % 3], &rows[(y + 1) % 3], reference_x.data(),
-                     reference_y.data(), width, kEdgeFloor * frame.source_mean,
+                     reference_y.data(), width, frame.floor * frame.source_mean,
                      kEdgeCap * frame.source_mean});
     }
     if (!times) return;

@@ -127,13 +127,15 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
                         double share_limit, double tolerance, const CalibrationOptions& options,
                         const Rig& anchor, Rig& rig) {
     const double start = seconds_now();
+    if (!options.parts.images && flow.empty())
+        return report_on(level, stage, rig, options.num_threads);
     SolverParameters p = solver_from_rig(rig);
     const SolverParameters held = solver_from_rig(anchor);
     ceres::Problem problem;
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
     const Parameters free = free_parameters(stage, options);
-    for (std::size_t i = 0; i < level.pairs.size(); ++i)
+    for (std::size_t i = 0; i < level.pairs.size() && options.parts.images; ++i)
         problem.AddResidualBlock(
             new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free), nullptr,
             blocks);

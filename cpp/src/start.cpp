@@ -234,11 +234,13 @@ void keep_best(std::vector<Candidate>& candidates, std::size_t count) {
 
 }  // namespace
 
-std::vector<Step> schedule(int width, int height) {
+std::vector<Step> schedule(int width, int height, const Parts& parts) {
     constexpr int kSmallestSide = 40;
     std::vector<Step> steps;
+    if (!parts.pyramid) return {{1, parts.stages ? 1 : 2}, {1, 2}};
     for (int factor : {8, 4})
-        if (std::min(width, height) / factor >= kSmallestSide) steps.push_back({factor, 1});
+        if (parts.stages && std::min(width, height) / factor >= kSmallestSide)
+            steps.push_back({factor, 1});
     for (int factor : {4, 2, 1})
         if (std::min(width, height) / factor >= kSmallestSide || factor == 1)
             steps.push_back({factor, 2});
@@ -286,7 +288,9 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     progress(0.4);
 
     const std::vector<Step> steps =
-        schedule(images.references[0].width, images.references[0].height);
+        schedule(images.references[0].width, images.references[0].height, options.parts);
+    const int placing =
+        schedule(images.references[0].width, images.references[0].height, {})[0].factor;
     const bool focal_free =
         !options.reference_camera && !options.reference_hfov_deg && !options.source_camera;
     // Placing costs hundreds of evaluations: fewer frames tell enough.
@@ -303,7 +307,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         candidate.rig = peak.rig;
         candidate.entry = out.candidates.size();
         if (initial) candidate.rig.source_from_reference.translation = initial->t();
-        const Level level = make_level(few, steps[0].factor, candidate.rig, num_threads);
+        const Level level = make_level(few, placing, candidate.rig, num_threads);
         const bool placed = searches && !initial;
         if (placed) place(level, inverse, focal_free, options, candidate);
         const NecValue value = pooled(level, candidate.rig, num_threads);
@@ -328,10 +332,11 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
             candidate.levels.push_back(
-                searches ? solve_level(level, {}, steps[s].stage, candidate.share_limit, kTolerance,
-                                       quick, candidate.rig, candidate.rig)
-                         : solve_stage(images, level, steps[s].stage, candidate.share_limit,
-                                       kTolerance, quick, flow, candidate.rig));
+                searches && options.parts.images
+                    ? solve_level(level, {}, steps[s].stage, candidate.share_limit, kTolerance,
+                                  quick, candidate.rig, candidate.rig)
+                    : solve_stage(images, level, steps[s].stage, candidate.share_limit, kTolerance,
+                                  quick, flow, candidate.rig));
             candidate.merit = merit(pooled(level, candidate.rig, num_threads));
             out.candidates[candidate.entry].refined = candidate.rig;
             out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;

@@ -18,7 +18,7 @@ struct Step {
 
 // Stage 1 holds at the coarse levels, where the dominant parameters are found, and everything is
 // free from there on. Levels too small to have edges are left out, but for the finest.
-std::vector<Step> schedule(int width, int height);
+std::vector<Step> schedule(int width, int height, const Parts& parts);
 
 struct Start {
     Rig rig;

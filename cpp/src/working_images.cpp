@@ -77,6 +77,8 @@ Image without_depth_edges(const Image& depth) {
     return out;
 }
 
+float floor_of(const Parts& parts) { return parts.floor ? kEdgeFloor : 0.0f; }
+
 }  // namespace
 
 void validate_frames(const std::vector<ImageView>& references,
@@ -100,14 +102,16 @@ void validate_frames(const std::vector<ImageView>& references,
 WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<ImageView>& sources,
                                   const std::vector<ImageView>& depths,
-                                  const std::vector<int>& chosen, int working_width,
-                                  int num_threads) {
+                                  const std::vector<int>& chosen,
+                                  const CalibrationOptions& options) {
     const Clock::time_point start = Clock::now();
-    const int reduction = (references[0].width + working_width - 1) / working_width;
+    const int reduction = (references[0].width + options.working_width - 1) / options.working_width;
     const int width = static_cast<int>(std::lround(references[0].width / double(reduction)));
     const int height = static_cast<int>(std::lround(references[0].height / double(reduction)));
     const std::size_t count = chosen.size();
+    const float floor = floor_of(options.parts);
     WorkingImages images;
+    images.parts = options.parts;
     images.references.resize(count);
     images.sources.resize(count);
     images.reference_edges.resize(count);
@@ -115,16 +119,20 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     for (int factor : kFactors)
         images.pyramid[factor] = {std::vector<Image>(count), std::vector<Image>(count),
                                   std::vector<EdgeMap>(factor >= kCoarse ? count : 0)};
-    parallel_each(static_cast<int>(count), num_threads, [&](int i) {
+    parallel_each(static_cast<int>(count), options.num_threads, [&](int i) {
         const int frame = chosen[i];
         for_frame("reference", frame, [&] {
-            images.references[i] =
-                normalize_dark(resize_area(to_gray(references[frame]), width, height));
+            images.references[i] = resize_area(to_gray(references[frame]), width, height);
+            if (options.parts.normalization)
+                images.references[i] = normalize_dark(images.references[i]);
         });
-        for_frame("source", frame,
-                  [&] { images.sources[i] = normalize_percentiles(to_gray(sources[frame])); });
-        images.source_edges[i] = edge_map(images.sources[i]);
-        images.reference_edges[i] = edge_map(images.references[i]);
+        for_frame("source", frame, [&] {
+            images.sources[i] = to_gray(sources[frame]);
+            if (options.parts.normalization)
+                images.sources[i] = normalize_percentiles(images.sources[i]);
+        });
+        images.source_edges[i] = edge_map(images.sources[i], floor);
+        images.reference_edges[i] = edge_map(images.references[i], floor);
         Image depth;
         for_frame("depth", frame, [&] {
             depth = resize_depth(clean_depth(depths[frame]), width, height);
@@ -139,7 +147,8 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
             level.references[i] = resize_area(images.references[i], w, h);
             level.depths[i] = resize_depth(depth, w, h);
             if (factor >= kCoarse) level.edges[i] = reduced(images.reference_edges[i], w, h);
-            else level.depths[i] = without_depth_edges(level.depths[i]);
+            else if (options.parts.depth_edges)
+                level.depths[i] = without_depth_edges(level.depths[i]);
         }
     });
     images.times->prepare += nanoseconds_since(start);
@@ -149,6 +158,7 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
 WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) const {
     WorkingImages out;
     out.times = times;
+    out.parts = parts;
     for (std::size_t i : indices) {
         out.references.push_back(references[i]);
         out.sources.push_back(sources[i]);
@@ -203,7 +213,7 @@ void fill(Level& level, const WorkingImages& images, const Rig& rig, int num_thr
     level.weights.resize(count);
     parallel_each(static_cast<int>(count), num_threads, [&](int i) {
         auto pair = make_pair(i);
-        level.weights[i] = pair->evaluate(at_level).norm;
+        level.weights[i] = images.parts.pair_weights ? pair->evaluate(at_level).norm : 1.0;
         pair->times = images.times;
         level.pairs[i] = std::move(pair);
     });
@@ -228,7 +238,7 @@ Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, in
             gaussian_blur(reduced.references[i], reference_blur),
             gaussian_blur(resize_area(images.sources[i], level.source_width, level.source_height),
                           kBlur),
-            reduced.depths[i], at_level));
+            reduced.depths[i], at_level, floor_of(images.parts)));
     });
     return level;
 }

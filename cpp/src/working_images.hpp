@@ -21,6 +21,7 @@ struct WorkingImages {
     std::vector<Image> sources;     // gray, normalized, as large as given
     std::vector<EdgeMap> reference_edges, source_edges;
     std::map<int, ReducedImages> pyramid;  // by the factor of kFactors
+    Parts parts;
 
     std::shared_ptr<WorkTimes> times = std::make_shared<WorkTimes>();  // of all pairs made of them
 
@@ -51,8 +52,8 @@ void validate_frames(const std::vector<ImageView>& references,
 WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<ImageView>& sources,
                                   const std::vector<ImageView>& depths,
-                                  const std::vector<int>& chosen, int working_width,
-                                  int num_threads);
+                                  const std::vector<int>& chosen,
+                                  const CalibrationOptions& options);
 
 // One level of the pyramid, made for the scale between the cameras that `rig` has.
 struct Level {

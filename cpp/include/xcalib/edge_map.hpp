@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "xcalib/export.hpp"
-#include "xcalib/image.hpp"
+#include "xcalib/nec.hpp"
 
 namespace XCALIB_EXPORT xcalib {
 
@@ -26,7 +26,7 @@ struct EdgeMap {
 // At the image's own size, halved until it is at most kEdgeMapWidth wide: nothing that reads it
 // needs more.
 inline constexpr int kEdgeMapWidth = 400;  // [px]
-EdgeMap edge_map(const Image& image);
+EdgeMap edge_map(const Image& image, float floor = kEdgeFloor);
 
 // Averaged over the area of each new pixel (a side that would grow is left as it is), less the mean
 // of some pixels around: what all edges of a region have in common does not tell where it lies.

@@ -39,7 +39,7 @@ struct EdgeField {
     int height = 0;
     std::vector<float> x, y;
 };
-EdgeField edge_field(const Image& image, float mean_magnitude);
+EdgeField edge_field(const Image& image, float mean_magnitude, float floor = kEdgeFloor);
 
 // Mean gradient magnitude m where `validity` is 0 throughout the stencil (null: everywhere).
 float mean_gradient(const Image& image, const std::uint8_t* validity);
@@ -50,11 +50,12 @@ struct NecFrame {
     Image depth;          // on the reference's grid [m]
     Image source;
     float source_mean = 0.0f;       // m of the warped source, held through a level
+    float floor = kEdgeFloor;       // in mean magnitudes
     double reference_energy = 0.0;  // sum of |reference|^2
 };
 
 NecFrame make_nec_frame(const Image& reference, const Image& source, const Image& depth,
-                        const Rig& rig);
+                        const Rig& rig, float floor = kEdgeFloor);
 
 struct NecValue {
     double nec = 0.0;          // in [0, 1]; 0 where no edges overlap

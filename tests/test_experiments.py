@@ -1,0 +1,74 @@
+"""The experiments of bench/experiments run, on next to nothing; their figures are not judged."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BENCH = Path(__file__).resolve().parents[1] / "bench" / "experiments"
+
+pytestmark = [
+    pytest.mark.skipif(not BENCH.is_dir(), reason="no bench folder"),
+    *(
+        pytest.mark.skipif(importlib.util.find_spec(name) is None, reason=f"needs {name}")
+        for name in ("matplotlib", "SimpleITK")
+    ),
+]
+
+
+def run(folder: Path, *arguments: str) -> str:
+    """The command's output."""
+    command = [sys.executable, str(BENCH), *arguments, "--quick", "--results", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"LANG": "C"})
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "table"),
+    [
+        (["3", "--part", "rendered"], "3_rendered"),
+        (["6"], "6_depth"),
+    ],
+)
+def test_an_experiment_leaves_its_table(tmp_path: Path, arguments: list[str], table: str) -> None:
+    docs = BENCH.parents[1] / "docs" / "results.md"
+    before = docs.read_bytes()
+    run(tmp_path, *arguments)
+    lines = (tmp_path / f"{table}.md").read_text().splitlines()
+    header, rows = lines[0], [line for line in lines[2:] if line.startswith("|")]
+    assert rows
+    assert all(row.count("|") == header.count("|") for row in rows)
+    csv = (tmp_path / f"{table}.csv").read_text().splitlines()
+    assert len(csv) == len(rows) + 1
+    assert docs.read_bytes() == before  # quick figures are nobody's results
+
+
+def test_metrics_by_shift(tmp_path: Path, xcalib_data: Path) -> None:
+    run(tmp_path, "1")
+    rows = (tmp_path / "1_metrics.csv").read_text().splitlines()
+    assert rows[1].startswith("NEC,")
+    assert (tmp_path / "1_metrics.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_every_table_has_its_place_in_the_docs() -> None:
+    """The names that the scripts give their tables, and the markers, are the same."""
+    import re
+
+    page = (BENCH.parents[1] / "docs" / "results.md").read_text()
+    marked = set(re.findall(r"<!-- (\w+) -->", page))
+    assert {f"<!-- /{name} -->" in page for name in marked} == {True}
+    modules = dict(re.findall(r'"(\w+)": "(\w+)"', (BENCH / "__main__.py").read_text()))
+    assert len(modules) == 10
+    named = set()
+    for experiment, module in modules.items():
+        text = (BENCH / f"{module}.py").read_text()
+        names = re.findall(r"(?:results\.table|night_table)\(\s*(?:results,\s*)?\"(\w+)\"", text)
+        assert names, module
+        named |= {f"{experiment}_{name}" for name in names}
+    assert named == marked
