@@ -190,7 +190,7 @@ def against_peer(name: str, folder: Path, truth: xcalib.Rig | None, rounds: int)
         ours.append(in_process("ours", folder, 32))
         theirs.append(in_process("peer", folder, 32))
     for clock, label, target in (
-        ("seconds", "time", "<= 0.25" if load < THREADS / 2 else None),
+        ("seconds", "time", "<= 0.25" if load < THREADS else None),
         ("processor", "processor time", None),
     ):
         our_time = np.array([r[clock] for r in ours])
@@ -198,7 +198,7 @@ def against_peer(name: str, folder: Path, truth: xcalib.Rig | None, rounds: int)
         spread(f"{name}: {label}, ours, search included", our_time, "s")
         spread(f"{name}: {label}, {theirs[0]['steps']} Adam steps in PyTorch", peer_time, "s")
         spread(f"{name}: {label}, ours of the peer's", our_time / peer_time, "", target)
-    if load >= THREADS / 2:
+    if load >= THREADS:
         reason = f"load average {load:.1f} at the start: PyTorch's threads wait for each other"
         skipped(f"{name}: time, ours of the peer's <= 0.25", reason)
     sets = read(folder, 32)
