@@ -265,7 +265,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
                  const ImageView& source, const std::optional<Rig>& initial,
                  const CalibrationOptions& options, const FlowEstimator& flow,
                  const std::function<void(double)>& progress) {
-    constexpr std::size_t kFrames = 12, kSearched = 8;
+    constexpr std::size_t kFrames = 8, kFew = 6;
     const WorkingImages images = all_images.spread(kFrames);
     const int num_threads = options.num_threads;
     const double start = seconds_now();
@@ -274,8 +274,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     std::vector<SearchCandidate> found;
     const bool searches = options.search.mode != SearchMode::off;
     if (searches) {
-        found = global_search(spread(images.reference_edges, kSearched),
-                              spread(images.source_edges, kSearched),
+        found = global_search(images.reference_edges, images.source_edges,
                               search_space(reference, source, initial, options), num_threads);
     } else {
         SearchCandidate given;
@@ -294,7 +293,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     const bool focal_free =
         !options.reference_camera && !options.reference_hfov_deg && !options.source_camera;
     // Placing costs hundreds of evaluations: fewer frames tell enough.
-    const WorkingImages few = images.spread(kFrames / 2);
+    const WorkingImages few = images.spread(kFew);
     const InverseDepths inverse = inverse_depths(few.pyramid.at(kCoarse));
     std::vector<Candidate> candidates;
     for (const SearchCandidate& peak : found) {
