@@ -175,9 +175,10 @@ WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) con
 }
 
 WorkingImages WorkingImages::spread(std::size_t count) const {
-    std::vector<std::size_t> indices(size());
-    std::iota(indices.begin(), indices.end(), 0);
-    return subset(xcalib::spread(indices, count));
+    count = std::min(count, size());
+    std::vector<std::size_t> indices;
+    for (std::size_t i = 0; i < count; ++i) indices.push_back(i * size() / count);
+    return subset(indices);
 }
 
 namespace {

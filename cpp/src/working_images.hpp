@@ -36,15 +36,6 @@ inline constexpr int kFactors[] = {8, 4, 2, 1};
 // From this factor on, edge maps are compared; the finer levels maximize the NEC itself.
 inline constexpr int kCoarse = 4;
 
-// `count` of these at most, at equal distances.
-template <class T>
-std::vector<T> spread(const std::vector<T>& all, std::size_t count) {
-    count = std::min(count, all.size());
-    std::vector<T> out;
-    for (std::size_t i = 0; i < count; ++i) out.push_back(all[i * all.size() / count]);
-    return out;
-}
-
 // Checks what was given, and throws naming the frame by its index in the caller's lists.
 void validate_frames(const std::vector<ImageView>& references,
                      const std::vector<ImageView>& sources, const std::vector<ImageView>& depths);
