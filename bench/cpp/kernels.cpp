@@ -17,6 +17,7 @@
 #include "nec_pass.hpp"
 #include "xcalib/edge_map.hpp"
 #include "xcalib/flow.hpp"
+#include "xcalib/gray.hpp"
 #include "xcalib/nec.hpp"
 #include "xcalib/register.hpp"
 #include "xcalib/search.hpp"
