@@ -16,9 +16,9 @@ from judge import SCORE_COLUMNS, Judged, judge, scores
 from results import Results
 
 import xcalib
+from xcalib._core import fit_plane, frames_to_judge_plane
 from xcalib.depth import PlaneDepth
 from xcalib.depth.completion import MIN_CONFIDENCE, complete
-from xcalib.depth.plane_fit import fit_plane, spread
 
 PAIRWISE: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "unregistered": unregistered,
@@ -103,7 +103,7 @@ class Sources:
 
     def refined_plane(self, rig: xcalib.Rig, names: list[str]):
         """Horizon and roll found from the frames that the rig was fitted on."""
-        some = spread(names)
+        some = [names[i] for i in frames_to_judge_plane(len(names))]
         images = (
             [self.night.rig.visible(n) for n in some],
             [self.night.rig.thermal(n) for n in some],
