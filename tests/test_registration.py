@@ -438,7 +438,9 @@ def test_more_frames_than_before(rendered: Path, tmp_path: Path) -> None:
 def test_two_runs_at_one_output(drive: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     child = process(*arguments(drive, out))
-    while not (out / "register.jsonl").exists():
+    journal = out / "register.jsonl"
+    # A line stands in it: it is locked by then.
+    while not (journal.exists() and journal.read_text().count("\n") > 1):
         time.sleep(0.001)
     child.send_signal(signal.SIGSTOP)
     try:
