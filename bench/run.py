@@ -108,6 +108,8 @@ def run_kernels(found: dict[str, Any]) -> tuple[list[dict[str, Any]], bool]:
             return [], False
         found["kernels"] = json.loads(out.read_text())
     context = found["kernels"]["context"]
+    for private in ("executable", "host_name"):
+        del context[private]
     wanted = ("highway_target", "compiler", "Ceres", "Eigen", "OpenCV")
     found["machine"] |= {key: context[key] for key in wanted}
     return roofline.figures_of(found["kernels"]), True

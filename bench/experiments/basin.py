@@ -92,6 +92,15 @@ def table_of(values: np.ndarray, x, y, corner: str) -> tuple[list[str], list[lis
     ]
 
 
+def rows_of(found: dict[str, np.ndarray], x, y) -> list[list[str]]:
+    """The tables of several methods, one below the other."""
+    return [
+        [f"{label}, {row[0]}", *row[1:]]
+        for label, values in found.items()
+        for row in table_of(values, x, y, "")[1]
+    ]
+
+
 def displacement(results: Results) -> None:
     ratios, shifts = results.of(RATIOS, RATIOS[2:3]), results.of(SHIFTS, SHIFTS[1:2])
     methods = dict(list(METHODS.items())[: results.of(None, 1)])
@@ -108,15 +117,10 @@ def displacement(results: Results) -> None:
                     found[label][i, j] += error(scene) < LIMIT
         print(seed, {label: f"{v.mean() / done:.0%}" for label, v in found.items()}, flush=True)
     found = {label: v / done for label, v in found.items()}
-    rows = [
-        [f"{label}, {row[0]}", *row[1:]]
-        for label, v in found.items()
-        for row in table_of(v, shifts, ratios, "")[1]
-    ]
     results.table(
         "displacement",
         ["found at ratio of fields of view \\ displacement", *(f"{s:g} w" for s in shifts)],
-        rows,
+        rows_of(found, shifts, ratios),
         f"{done} rendered rig{'s' * (done > 1)} of 320x240 in each cell, 4 frames, baseline"
         f" {BASELINE:g} m, roll within 2 deg; found: median end-point error under {LIMIT:g} px."
         " Ratio of tangents, source to reference (50 deg); displacement in widths, any direction.",
@@ -149,15 +153,10 @@ def frames(results: Results) -> None:
                     found[label][i, j] += scene.error(result.rig) < LIMIT
         print(seed, {k: v.mean() / done for k, v in found.items()}, flush=True)
     values = {label: v / done for label, v in found.items()}
-    rows = [
-        [f"{label}, {row[0]}", *row[1:]]
-        for label, v in values.items()
-        for row in table_of(v, rolls, counts, "")[1]
-    ]
     results.table(
         "frames",
         ["found at frames \\ roll", *(f"{r:g} deg" for r in rolls)],
-        rows,
+        rows_of(values, rolls, counts),
         f"{done} rendered rig{'s' * (done > 1)} of 320x240 in each cell, displaced by 0.1 of the"
         " width, ratio of fields of view 0.8-1.25; the search looks for rolls within 5 deg unless"
         " told otherwise.",

@@ -322,10 +322,7 @@ void add_calibrate(CLI::App& app, Console& console) {
     command->footer("The rig is written even if it is not to be trusted (exit code 3).");
     auto arguments = std::make_shared<Arguments>();
     Arguments& a = *arguments;
-    command->add_option("REFERENCE", a.frames.reference)->required();
-    command->add_option("SOURCE", a.frames.source)->required();
-    add_depth(*command, a.frames.depth);
-    add_footage(*command, a.frames);
+    add_frames(*command, a.frames);
     command->add_option("-o,--output", a.output, "Rig file to write (YAML).")
         ->type_name("RIG")
         ->required();

@@ -71,10 +71,7 @@ void add_evaluate(CLI::App& app, Console& console) {
     auto arguments = std::make_shared<Arguments>();
     Arguments& a = *arguments;
     command->add_option("RIG", a.rig)->required();
-    command->add_option("REFERENCE", a.frames.reference)->required();
-    command->add_option("SOURCE", a.frames.source)->required();
-    add_depth(*command, a.frames.depth);
-    add_footage(*command, a.frames);
+    add_frames(*command, a.frames);
     command
         ->add_option("--width", a.width,
                      "Judge at the reference size divided by the least integer that makes it this"

@@ -25,8 +25,6 @@ double seconds(const std::string& text) {
     return value;
 }
 
-}  // namespace
-
 void add_depth(CLI::App& command, DepthArguments& arguments) {
     command
         .add_option("--depth", arguments.spec,
@@ -100,6 +98,15 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
         .add_option("--source-times", arguments.source_times,
                     "Times of the source frames: lines `name timestamp`.  [default: their own]")
         ->type_name("FILE");
+}
+
+}  // namespace
+
+void add_frames(CLI::App& command, FrameArguments& arguments) {
+    command.add_option("REFERENCE", arguments.reference)->required();
+    command.add_option("SOURCE", arguments.source)->required();
+    add_depth(command, arguments.depth);
+    add_footage(command, arguments);
 }
 
 void add_threads(CLI::App& command, int& threads) {

@@ -31,8 +31,8 @@ struct FrameArguments {
     std::string reference_times, source_times;
 };
 
-void add_depth(CLI::App& command, DepthArguments& arguments);
-void add_footage(CLI::App& command, FrameArguments& arguments);
+// REFERENCE, SOURCE and how they and their depth are read.
+void add_frames(CLI::App& command, FrameArguments& arguments);
 void add_threads(CLI::App& command, int& threads);
 void add_colormap(CLI::App& command, std::string& colormap);
 

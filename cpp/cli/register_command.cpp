@@ -159,10 +159,7 @@ void add_register(CLI::App& app, Console& console) {
     auto arguments = std::make_shared<RegisterArguments>();
     RegisterArguments& a = *arguments;
     command->add_option("RIG", a.rig)->required();
-    command->add_option("REFERENCE", a.frames.reference)->required();
-    command->add_option("SOURCE", a.frames.source)->required();
-    add_depth(*command, a.frames.depth);
-    add_footage(*command, a.frames);
+    add_frames(*command, a.frames);
     command
         ->add_option("-o,--output", a.output,
                      "Folder to write to: images under the reference's names, and masks/. Or a"

@@ -2,13 +2,12 @@
 #include <vector>
 
 #include "image_pair.hpp"
+#include "kernel_targets.hpp"
 #include "map_row.hpp"
 #include "nec_pass.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "edge_pair.cpp"
-// Vectors whose size is not known to the compiler cannot stand in a struct.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/foreach_target.h>
 // After it.
 #include "pass-inl.hpp"
@@ -177,22 +176,15 @@ NecValue value_of(const EdgeSums& sums, double reference_energy) {
 // Calls work(y) for each row once it is warped, and gives the sums.
 template <class Work>
 EdgeSums for_each_warped_row(EdgePass& pass, WorkTimes* times, const Work& work) {
-    const Clock::time_point start = Clock::now();
-    std::int64_t warping = 0;
+    PassClock clock(times, pass.parameters.size() > 0);
     EdgeSums sums;
     for (int y = 0; y < pass.depth.height; ++y) {
-        const Clock::time_point before = Clock::now();
-        const EdgeSums row = HWY_DYNAMIC_DISPATCH(warp_edge_row)(pass, y);
-        if (times) warping += nanoseconds_since(before);
+        const EdgeSums row =
+            clock.warp([&] { return HWY_DYNAMIC_DISPATCH(warp_edge_row)(pass, y); });
         sums.rr += row.rr;
         sums.ss += row.ss;
         sums.rs += row.rs;
         work(y);
-    }
-    if (times) {
-        times->warp += warping;
-        (pass.parameters.size() > 0 ? times->jacobian : times->value) +=
-            nanoseconds_since(start) - warping;
     }
     return sums;
 }

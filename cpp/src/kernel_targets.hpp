@@ -1,4 +1,4 @@
-// Before Highway: for which instruction sets the registrar's loops are compiled.
+// Before Highway: for which instruction sets the loops are compiled.
 #pragma once
 
 // Vectors whose size is not known to the compiler cannot stand in a struct.

@@ -5,12 +5,11 @@
 #include <limits>
 #include <vector>
 
+#include "kernel_targets.hpp"
 #include "map_row.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nec_pass.cpp"
-// Vectors whose size is not known to the compiler cannot stand in a struct.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/foreach_target.h>
 // After it.
 #include "pass-inl.hpp"
@@ -218,8 +217,7 @@ HWY_EXPORT(flush_tile);
 template <class Work>
 void for_each_row(const NecFrame& frame, const Rig& rig, const Parameters& parameters,
                   WorkTimes* times, const Work& work) {
-    const Clock::time_point start = Clock::now();
-    std::int64_t warping = 0;
+    PassClock clock(times, parameters.size() > 0);
     const int width = frame.depth.width, height = frame.depth.height;
     if (width < 3 || height < 3) return;
     Pass pass(frame, rig, parameters);
@@ -227,9 +225,7 @@ void for_each_row(const NecFrame& frame, const Rig& rig, const Parameters& param
     std::array<WarpedRow, 3> rows{empty, empty, empty};
     std::vector<float> reference_x(width + kRoom), reference_y(width + kRoom);
     const auto warp = [&](int y) {
-        const Clock::time_point before = Clock::now();
-        HWY_DYNAMIC_DISPATCH(warp_row)(pass, y, rows[y % 3]);
-        if (times) warping += nanoseconds_since(before);
+        clock.warp([&] { HWY_DYNAMIC_DISPATCH(warp_row)(pass, y, rows[y % 3]); });
         if (parameters.size() > 0) HWY_DYNAMIC_DISPATCH(derive_row)(pass, y, rows[y % 3]);
     };
     warp(0);
@@ -243,9 +239,6 @@ void for_each_row(const NecFrame& frame, const Rig& rig, const Parameters& param
                      reference_y.data(), width, frame.floor * frame.source_mean,
                      kEdgeCap * frame.source_mean});
     }
-    if (!times) return;
-    times->warp += warping;
-    (parameters.size() > 0 ? times->jacobian : times->value) += nanoseconds_since(start) - warping;
 }
 
 }  // namespace

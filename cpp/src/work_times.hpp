@@ -30,4 +30,35 @@ struct WorkTimes {
     }
 };
 
+// The clock of one pass over an image pair: what is not spent in `warp` is of the kind that the
+// pass is of. Without `times` nothing is kept.
+class PassClock {
+   public:
+    PassClock(WorkTimes* times, bool derives)
+        : times_(times), kind_(times ? derives ? &times->jacobian : &times->value : nullptr) {}
+    ~PassClock() {
+        if (!times_) return;
+        times_->warp += warping_;
+        *kind_ += nanoseconds_since(start_) - warping_;
+    }
+    PassClock(const PassClock&) = delete;
+    PassClock& operator=(const PassClock&) = delete;
+
+    template <class Work>
+    auto warp(const Work& work) {
+        struct Stop {
+            PassClock& clock;
+            Clock::time_point start = Clock::now();
+            ~Stop() { clock.warping_ += nanoseconds_since(start); }
+        } stop{*this};
+        return work();
+    }
+
+   private:
+    WorkTimes* times_;
+    std::atomic<std::int64_t>* kind_;
+    Clock::time_point start_ = Clock::now();
+    std::int64_t warping_ = 0;
+};
+
 }  // namespace xcalib

@@ -10,6 +10,7 @@
 
 #include "refusal.hpp"
 #include "scenes.hpp"
+#include "views.hpp"
 #include "xcalib/image.hpp"
 
 namespace xcalib {
@@ -17,25 +18,10 @@ namespace {
 
 using ::xcalib::testing::drawn;
 using ::xcalib::testing::has;
+using ::xcalib::testing::kInfinity;
+using ::xcalib::testing::kNaN;
 using ::xcalib::testing::refusal;
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-template <class T>
-constexpr PixelType kType = PixelType::u8;
-template <>
-constexpr PixelType kType<std::uint16_t> = PixelType::u16;
-template <>
-constexpr PixelType kType<float> = PixelType::f32;
-
-template <class T>
-ImageView view_of(const std::vector<T>& pixels, int width, int height, int channels = 1,
-                  int values_per_row = 0) {
-    const int row = values_per_row ? values_per_row : width * channels;
-    return {pixels.data(), width,    height,
-            channels,      kType<T>, static_cast<std::ptrdiff_t>(row * sizeof(T))};
-}
+using ::xcalib::testing::view_of;
 
 // --- Depth
 // ----------------------------------------------------------------------------------------
