@@ -11,6 +11,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -152,6 +153,14 @@ inline float least_depth(const Reprojection& r, int y, int width) {
     if (!(slowest > 0)) return std::numeric_limits<float>::max();
     const double depth = std::max(kNearestZ, (kNearestZ - r.k.z()) / slowest);
     return static_cast<float>(std::min<double>(1.0001 * depth, std::numeric_limits<float>::max()));
+}
+
+// How far apart in the source the points of neighbouring pixels of a row are, of something far.
+// [px]
+inline double source_step(const Reprojection& r, int x, int y) {
+    const double u = r.h(0, 1) * y + r.h(0, 2), z = r.h(2, 1) * y + r.h(2, 2);
+    const double depth = r.h(2, 0) * x + z;
+    return std::abs(r.h(0, 0) * z - r.h(2, 0) * u) / (depth * depth);
 }
 
 // Takes the points on the rim into the source. Where not valid, u and v are 0 then.

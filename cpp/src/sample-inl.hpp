@@ -106,32 +106,83 @@ HWY_INLINE void gather_pairs(std::uint8_t, const char* base, Int offsets, Int, P
 #if HWY_TARGET != HWY_SCALAR
 // The same from one stretch of a row, into which all points fall: neighbours in the reference are
 // neighbours in the source, save across a depth edge. A shuffle is far cheaper than a gather.
-// `index` is the left pixel's place in the stretch, from 0 to window<T>() - 1, a power of two less
-// one; of what lies elsewhere something comes out, which does not count.
-template <class T>
+// `index` is the left pixel's place in the stretch, from 0 to window - 1, a power of two less one;
+// of what lies elsewhere something comes out, which does not count. A stretch is one register, or
+// two where the source is about as fine as the reference; where it is finer still, none.
+enum class Reach { one, two, none };
+
+#undef XCALIB_LOOK_UP_16  // 16 bits of 32
+#define XCALIB_LOOK_UP_16 (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3)
+
+template <class T, Reach reach>
 constexpr int window() {
-    return sizeof(T) == 1 ? 16 : kLanes;
+    if (XCALIB_LOOK_UP_16 && sizeof(T) == 2) return 32;
+    return (sizeof(T) == 1 ? 16 : kLanes) * (reach == Reach::two ? 2 : 1);
 }
+// Of a window, as many pixels lie before the first of a vector's points.
+template <class T, Reach reach>
+constexpr int kBefore = window<T, reach>() / 8;
+
+HWY_INLINE Int look_up(Int table, Int index) {
+    const IntTag d;
+    return hn::TableLookupLanes(table, hn::IndicesFromVec(d, hn::And(index, set(kLanes - 1))));
+}
+HWY_INLINE Int look_up(Int low, Int high, Int index) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+    return Int{_mm512_permutex2var_epi32(low.raw, index.raw, high.raw)};
+#else
+    const auto beyond = hn::TestBit(index, set(kLanes));
+    return hn::IfThenElse(beyond, look_up(high, index), look_up(low, index));
+#endif
+}
+
+template <Reach reach>
 HWY_INLINE Pair pair_in_window(const float* row, Int index) {
     const FloatTag d;
-    const auto lanes = hn::IndicesFromVec(d, hn::And(index, set(kLanes - 1)));
-    return {hn::TableLookupLanes(hn::LoadU(d, row), lanes),
-            hn::TableLookupLanes(hn::LoadU(d, row + 1), lanes)};
+    const auto load = [](const float* from)
+                          HWY_ATTR { return hn::BitCast(IntTag(), hn::LoadU(FloatTag(), from)); };
+    if constexpr (reach == Reach::one)
+        return {hn::BitCast(d, look_up(load(row), index)),
+                hn::BitCast(d, look_up(load(row + 1), index))};
+    else
+        return {hn::BitCast(d, look_up(load(row), load(row + kLanes), index)),
+                hn::BitCast(d, look_up(load(row + 1), load(row + 1 + kLanes), index))};
 }
+
+template <Reach reach>
 HWY_INLINE Pair pair_in_window(const std::uint16_t* row, Int index) {
+#if XCALIB_LOOK_UP_16
+    const __m512i place = hn::Or(index, hn::ShiftLeft<16>(index)).raw;
+    const __m512i left = _mm512_permutexvar_epi16(place, _mm512_loadu_si512(row));
+    const Int both{
+        _mm512_mask_permutexvar_epi16(left, 0xaaaaaaaau, place, _mm512_loadu_si512(row + 1))};
+#else
     const IntTag d;
-    const Int left = hn::PromoteTo(d, hn::LoadU(ShortTag(), row));
-    const Int right = hn::PromoteTo(d, hn::LoadU(ShortTag(), row + 1));
-    const Int both = hn::TableLookupLanes(hn::Or(left, hn::ShiftLeft<16>(right)),
-                                          hn::IndicesFromVec(d, hn::And(index, set(kLanes - 1))));
+    const auto load = [d](const std::uint16_t* from) HWY_ATTR {
+        const Int left = hn::PromoteTo(d, hn::LoadU(ShortTag(), from));
+        const Int right = hn::PromoteTo(d, hn::LoadU(ShortTag(), from + 1));
+        return hn::Or(left, hn::ShiftLeft<16>(right));
+    };
+    const Int both = reach == Reach::one ? look_up(load(row), index)
+                                         : look_up(load(row), load(row + kLanes), index);
+#endif
     return {low_of(both), high_of(both)};
 }
+
+template <Reach reach>
 HWY_INLINE Pair pair_in_window(const std::uint8_t* row, Int index) {
     const hn::Repartition<std::uint8_t, IntTag> bytes;
-    const auto places = hn::BitCast(bytes, hn::Or(index, set(static_cast<int>(0x80808000))));
+    // Of a place, the upper bit makes it 0, and only the lowest four count.
+    const auto places = [&](Int at) HWY_ATTR {
+        return hn::BitCast(bytes, hn::Or(at, set(static_cast<int>(0x80808000))));
+    };
+    const auto low = places(reach == Reach::one ? index : hn::Add(index, set(0x70)));
+    const auto high = places(hn::Add(hn::Xor(index, set(16)), set(0x70)));
     const auto in = [&](const std::uint8_t* from) HWY_ATTR {
-        const auto looked_up = hn::TableLookupBytesOr0(hn::LoadDup128(bytes, from), places);
-        return hn::ConvertTo(FloatTag(), hn::BitCast(IntTag(), looked_up));
+        auto found = hn::TableLookupBytesOr0(hn::LoadDup128(bytes, from), low);
+        if constexpr (reach == Reach::two)
+            found = hn::Or(found, hn::TableLookupBytesOr0(hn::LoadDup128(bytes, from + 16), high));
+        return hn::ConvertTo(FloatTag(), hn::BitCast(IntTag(), found));
     };
     return {in(row), in(row + 1)};
 }
@@ -208,21 +259,25 @@ HWY_INLINE Mask is_behind(const CellGrid& grid, Float nearest, Float inverse_z) 
     return hn::Gt(nearest, bound);
 }
 
-// Those that something nearer hides, of points within the source; anything of others.
-HWY_INLINE Mask hidden(const CellGrid& grid, const Nearness* cells, const Points& p) {
+// What is nearest in the cells of points within the source; anything for others.
+HWY_INLINE Float nearest_in(const CellGrid& grid, const Nearness* cells, Float x, Float y) {
     const FloatTag d;
     const hn::RebindToUnsigned<IntTag> du;
-    const Cells at(grid, p);
-    const Float cell = hn::MulAdd(hn::Sub(at.y, set(kLarge)), set(static_cast<double>(grid.width)),
-                                  hn::Sub(at.x, set(kLarge)));
+    const Float cell = hn::MulAdd(hn::Sub(y, set(kLarge)), set(static_cast<double>(grid.width)),
+                                  hn::Sub(x, set(kLarge)));
     const auto last = hn::Set(du, static_cast<std::uint32_t>(grid.count()));
     const Int there = hn::BitCast(IntTag(), hn::Min(hn::BitCast(du, to_integer(cell)), last));
     const auto nearness_at = [&](const Nearness* from) HWY_ATTR {
         const auto* bytes = reinterpret_cast<const char*>(from);
         return hn::BitCast(d, hn::ShiftLeft<16>(gather_words(bytes, hn::ShiftLeft<1>(there))));
     };
-    return is_behind(grid, hn::Max(nearness_at(cells), nearness_at(cells + grid.step())),
-                     p.inverse_z);
+    return hn::Max(nearness_at(cells), nearness_at(cells + grid.step()));
+}
+
+// Those that something nearer hides, of points within the source; anything of others.
+HWY_INLINE Mask hidden(const CellGrid& grid, const Nearness* cells, const Points& p) {
+    const Cells at(grid, p);
+    return is_behind(grid, nearest_in(grid, cells, at.x, at.y), p.inverse_z);
 }
 
 HWY_INLINE Int code_of(Validity code) { return set(static_cast<int>(code)); }
@@ -252,79 +307,47 @@ struct Places {
     }
 };
 
+// Between the four pixels of which (x, y) is the upper left.
 template <class T, int kChannels>
-HWY_INLINE void interpolate_anywhere(const Source& source, const Places& p,
+HWY_INLINE void interpolate_anywhere(const Source& source, Int x, Int y, Float a, Float b,
                                      Float (&values)[kChannels]) {
     const Int stride = set(static_cast<int>(source.row_bytes));
-    const Int offsets =
-        hn::Add(hn::Mul(p.y, stride), hn::Mul(p.x, set(kChannels * int{sizeof(T)})));
+    const Int offsets = hn::Add(hn::Mul(y, stride), hn::Mul(x, set(kChannels * int{sizeof(T)})));
     const Int last = set(source.last);
     Pair top[kChannels], bottom[kChannels];
     gather_pairs(T(), source.data, offsets, last, top);
     gather_pairs(T(), source.data, hn::Add(offsets, stride), last, bottom);
-    for (int c = 0; c < kChannels; ++c) values[c] = between(top[c], bottom[c], p.a, p.b);
+    for (int c = 0; c < kChannels; ++c) values[c] = between(top[c], bottom[c], a, b);
 }
 
 #if HWY_TARGET != HWY_SCALAR
-// The first column of a window with pixel `first`, of a source that is wider than it. Left of that
-// pixel may be some others.
+// What holds a vector's points, so many source pixels apart, on one surface, of a source wider than
+// the window.
 template <class T>
-HWY_INLINE int window_from(const Source& source, int first) {
-    constexpr int kBefore = window<T>() / 8;
-    return std::clamp(first, kBefore, source.width - 1 - window<T>() + kBefore) - kBefore;
+HWY_INLINE Reach reach_of(const Source& source, double step) {
+    const double needed = (kLanes - 1) * step + 1.5;
+    constexpr int kOne = window<T, Reach::one>(), kTwo = window<T, Reach::two>();
+    if (needed + kBefore<T, Reach::one> < kOne && source.width > kOne) return Reach::one;
+    if (needed + kBefore<T, Reach::two> < kTwo && source.width > kTwo) return Reach::two;
+    return Reach::none;
 }
 
-template <class T>
-HWY_INLINE Float interpolate_in_window(const Source& source, int from, int row, Int index, Float a,
+// In a window that begins at this byte of the source, of points whose left pixels are at `index`.
+template <class T, Reach reach>
+HWY_INLINE Float interpolate_in_window(const Source& source, int offset, Int index, Float a,
                                        Float b) {
-    return between(pair_in_window(source.at<T>(from, row), index),
-                   pair_in_window(source.at<T>(from, row + 1), index), a, b);
-}
-
-// At a depth edge, or where the points come into the next row, few windows hold all of them.
-template <class T>
-HWY_INLINE void interpolate_in_windows(const Source& source, const Places& p, Mask valid,
-                                       Float (&values)[1]) {
-    const FloatTag d;
-    const IntTag di;
-    constexpr int kMost = 4;  // more take longer than to gather
-    values[0] = hn::Zero(d);
-    HWY_ALIGN std::int32_t x[kLanes], y[kLanes];
-    hn::Store(p.x, di, x);
-    hn::Store(p.y, di, y);
-    Mask left = valid;
-    for (int i = 0; i < kMost; ++i) {
-        const auto first = hn::FindFirstTrue(d, left);
-        if (first < 0) return;
-        const int from = window_from<T>(source, x[first]), row = y[first];
-        const Int index = hn::Sub(p.x, set(from));
-        const Int apart = hn::Or(hn::Xor(p.y, set(row)), hn::AndNot(set(window<T>() - 1), index));
-        const Mask here = hn::And(left, hn::RebindMask(d, hn::Eq(apart, hn::Zero(di))));
-        values[0] = hn::IfThenElse(
-            here, interpolate_in_window<T>(source, from, row, index, p.a, p.b), values[0]);
-        left = hn::AndNot(here, left);
-    }
-    if (hn::AllFalse(d, left)) return;
-    Float gathered[1];
-    interpolate_anywhere<T>(source, p, gathered);
-    values[0] = hn::IfThenElse(left, gathered[0], values[0]);
+    const char* upper = source.data + offset;
+    const char* lower = upper + source.row_bytes;
+    return between(pair_in_window<reach>(reinterpret_cast<const T*>(upper), index),
+                   pair_in_window<reach>(reinterpret_cast<const T*>(lower), index), a, b);
 }
 #endif
 
 template <class T, int kChannels>
 HWY_INLINE void sample_bilinear(const Source& source, const Located& at, Mask valid, T* out) {
-    const Places places(source, at, valid);
+    const Places p(source, at, valid);
     Float values[kChannels];
-#if HWY_TARGET != HWY_SCALAR
-    if constexpr (kChannels == 1) {
-        if (source.width > window<T>()) interpolate_in_windows<T>(source, places, valid, values);
-        else interpolate_anywhere<T>(source, places, values);
-    } else {
-        interpolate_anywhere<T>(source, places, values);
-    }
-#else
-    interpolate_anywhere<T>(source, places, values);
-#endif
+    interpolate_anywhere<T>(source, p.x, p.y, p.a, p.b, values);
     for (Float& value : values) value = hn::IfThenElseZero(valid, value);
     store_pixels(values, out);
 }

@@ -14,45 +14,85 @@ namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
 
+// Upper halves of 1/z. Of positive floats the greater has the greater bits.
+HWY_INLINE Int nearness_of(const Points& p) {
+    return hn::ShiftRight<16>(hn::BitCast(IntTag(), p.inverse_z));
+}
+
 // Raises cells to the nearness of points, whose u and v are in cells.
 HWY_INLINE void splat(const CellGrid& grid, Float depth, const Points& p,
                       Nearness* HWY_RESTRICT cells) {
     const FloatTag d;
-    // Of positive floats the greater has the greater bits.
-    const Int bits = hn::ShiftRight<16>(hn::BitCast(IntTag(), p.inverse_z));
-    const Mask ahead = in_front(depth, p);
-#if HWY_TARGET != HWY_SCALAR
-    // Pixels of one surface fall into neighbouring cells: all are written at once, where this moves
-    // none by more than half a cell.
-    const Float start = hn::Sub(p.u, hn::Iota(d, 0.0f));
-    const float u = hn::ExtractLane(start, kLanes / 2), v = hn::ExtractLane(p.v, kLanes / 2);
-    const Float apart = hn::Max(hn::Abs(hn::Sub(start, set(u))), hn::Abs(hn::Sub(p.v, set(v))));
-    const float last_u = static_cast<float>(grid.width - kLanes);
-    const float last_v = static_cast<float>(grid.height - 1);
-    if (u >= 0 && u <= last_u && v >= 0 && v <= last_v &&
-        hn::AllTrue(d, hn::And(ahead, hn::Lt(apart, set(0.5))))) {
-        const ShortTag shorts;
-        Nearness* to = cells + static_cast<std::ptrdiff_t>(v) * grid.width + static_cast<int>(u);
-        hn::StoreU(hn::Max(hn::LoadU(shorts, to), hn::DemoteTo(shorts, bits)), shorts, to);
-        return;
-    }
-#endif
     const Float zero = hn::Zero(d);
     const Mask in_x = hn::And(hn::Ge(p.u, zero), hn::Lt(p.u, set(grid.width - 1.0)));
     const Mask in_y = hn::And(hn::Ge(p.v, zero), hn::Lt(p.v, set(grid.height - 1.0)));
-    const Mask inside = hn::And(hn::And(in_x, in_y), ahead);
+    const Mask inside = hn::And(hn::And(in_x, in_y), in_front(depth, p));
     if (hn::AllFalse(d, inside)) return;
     HWY_ALIGN std::int32_t index[kLanes], nearness[kLanes];
     const Int cell =
         cells_of(grid, hn::IfThenElseZero(inside, p.u), hn::IfThenElseZero(inside, p.v));
     hn::Store(hn::IfThenElse(hn::RebindMask(IntTag(), inside), cell, set(grid.count())), IntTag(),
               index);
-    hn::Store(bits, IntTag(), nearness);
+    hn::Store(nearness_of(p), IntTag(), nearness);
     for (int i = 0; i < kLanes; ++i) {
         Nearness& at = cells[index[i]];
         at = std::max(at, static_cast<Nearness>(nearness[i]));
     }
 }
+
+#if HWY_TARGET != HWY_SCALAR
+using Vectors = std::uint32_t;  // one bit for each
+constexpr int kVectors = 16;
+
+// The same of `count` vectors from pixel `begin` of a row on. Pixels of one surface fall into
+// neighbouring cells: all of a vector are written at once, where this moves none by more than half
+// a cell. Returns which remain to be done.
+HWY_INLINE Vectors splat_together(const CellGrid& grid, const Row& row, const DepthRow& depths,
+                                  int begin, int count, Nearness* HWY_RESTRICT cells) {
+    const FloatTag d;
+    const IntTag di;
+    const ShortTag shorts;
+    HWY_ALIGN Nearness nearness[kVectors][kLanes];
+    HWY_ALIGN float u[kVectors] = {}, v[kVectors] = {};
+    Vectors together = 0;
+    Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
+    for (int i = 0; i < count; ++i) {
+        const Float depth = depths.load(begin + i * kLanes);
+        depths.prefetch_next_row(begin + i * kLanes);
+        const Points p = project_roughly(row, depth, along);
+        const Float start = hn::Sub(p.u, hn::Iota(d, 0.0f));
+        u[i] = hn::ExtractLane(start, kLanes / 2);
+        v[i] = hn::ExtractLane(p.v, kLanes / 2);
+        const Float apart =
+            hn::Max(hn::Abs(hn::Sub(start, set(u[i]))), hn::Abs(hn::Sub(p.v, set(v[i]))));
+        const Mask fits = hn::And(in_front(depth, p), hn::Lt(apart, set(0.5)));
+        together |= Vectors{hn::AllTrue(d, fits)} << i;
+        hn::Store(hn::DemoteTo(shorts, nearness_of(p)), shorts, nearness[i]);
+        along = hn::Add(along, set(double{kLanes}));
+    }
+    HWY_ALIGN std::int32_t first[kVectors];
+    for (int i = 0; i < kVectors; i += kLanes) {
+        const Float x = hn::Load(d, u + i), y = hn::Load(d, v + i), zero = hn::Zero(d);
+        const Mask in_x = hn::And(hn::Ge(x, zero), hn::Le(x, set(double(grid.width - kLanes))));
+        const Mask in_y = hn::And(hn::Ge(y, zero), hn::Le(y, set(grid.height - 1.0)));
+        const Int cell = cells_of(grid, x, y);
+        hn::Store(hn::IfThenElse(hn::RebindMask(di, hn::And(in_x, in_y)), cell, set(-1)), di,
+                  first + i);
+    }
+    Vectors left = (Vectors{1} << (count - 1) << 1) - 1;
+    // Neighbours may share a cell: to read what has just been written takes long.
+    for (int odd = 0; odd < 2; ++odd) {
+        for (int i = odd; i < count; i += 2) {
+            if (!((together >> i) & 1) || first[i] < 0) continue;
+            left &= ~(Vectors{1} << i);
+            Nearness* to = cells + first[i];
+            const auto nearest = hn::Max(hn::LoadU(shorts, to), hn::Load(shorts, nearness[i]));
+            hn::StoreU(nearest, shorts, to);
+        }
+    }
+    return left;
+}
+#endif
 
 void splat_rows(const Reprojection& reprojection, const DepthView& depth, const CellGrid& grid,
                 int begin, int end, Nearness* HWY_RESTRICT cells) {
@@ -60,11 +100,22 @@ void splat_rows(const Reprojection& reprojection, const DepthView& depth, const 
     for (int y = begin; y < end; ++y) {
         const Row row(reprojection, y, 0, grid.per_pixel_x, grid.per_pixel_y);
         const DepthRow depths(depth, y);
-        Float along = hn::Iota(FloatTag(), 0.0f);
-        for (int x = 0; x < width; x += kLanes, along = hn::Add(along, set(double{kLanes}))) {
+        const auto splat_at = [&](int x) HWY_ATTR {
+            const Float along = hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
             const Float z = depths.load(x, width - x);
             splat(grid, z, project_roughly(row, z, along), cells);
+        };
+        int x = 0;
+#if HWY_TARGET != HWY_SCALAR
+        while (width - x >= kLanes) {
+            const int count = std::min(kVectors, (width - x) / kLanes);
+            Vectors left = splat_together(grid, row, depths, x, count, cells);
+            for (; left; left &= left - 1)
+                splat_at(x + kLanes * static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left)));
+            x += count * kLanes;
         }
+#endif
+        for (; x < width; x += kLanes) splat_at(x);
     }
 }
 
