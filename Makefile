@@ -94,15 +94,15 @@ lint: $(VENV)/.installed $(VENV)/.test-requires | test-packages ## formatting, l
 	$(BIN)/ruff check
 	$(BIN)/mypy
 
-# $(call preset,name): configures, builds and tests one of CMakePresets.json.
+# $(call preset,name,options): configures, builds and tests one of CMakePresets.json.
 define preset
-cmake --preset $(1) -DXCALIB_WERROR=$(WERROR)
+cmake --preset $(1) -DXCALIB_WERROR=$(WERROR) $(2)
 cmake --build --preset $(1)
 ctest --preset $(1)
 endef
 
-test-cpp: | test-packages ## C++ tests, and the installed libraries used by others' projects
-	$(call preset,release)
+test-cpp: | test-packages bench-packages ## C++ tests, and the installed libraries used by others' projects
+	$(call preset,release,-DXCALIB_BENCH=ON)
 	$(call preset,embedded)
 
 sanitize: | test-packages ## C++ tests under the address and undefined-behaviour sanitizers
