@@ -43,6 +43,16 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(FloatTag()));
 HWY_INLINE Float set(double value) { return hn::Set(FloatTag(), static_cast<float>(value)); }
 HWY_INLINE Int set(int value) { return hn::Set(IntTag(), value); }
 
+// Vectors of a row that are worked on together: one bit for each.
+using Vectors = std::uint32_t;
+constexpr int kVectors = 16;
+static_assert(kVectors % kLanes == 0, "what is one number for each goes into whole vectors");
+
+HWY_INLINE Vectors all_of(int count) { return (Vectors{1} << (count - 1) << 1) - 1; }
+HWY_INLINE int first_of(Vectors vectors) {
+    return static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(vectors));
+}
+
 // A number plus kLarge is rounded to a whole one, of which the bits less kLargeBits are the
 // integer. Holds up to 4 million, and is cheaper than a conversion, which has to look out for
 // overflow.

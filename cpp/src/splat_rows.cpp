@@ -41,9 +41,6 @@ HWY_INLINE void splat(const CellGrid& grid, Float depth, const Points& p,
 }
 
 #if HWY_TARGET != HWY_SCALAR
-using Vectors = std::uint32_t;  // one bit for each
-constexpr int kVectors = 16;
-
 // The same of `count` vectors from pixel `begin` of a row on. Pixels of one surface fall into
 // neighbouring cells: all of a vector are written at once, where this moves none by more than half
 // a cell. Returns which remain to be done.
@@ -79,7 +76,7 @@ HWY_INLINE Vectors splat_together(const CellGrid& grid, const Row& row, const De
         hn::Store(hn::IfThenElse(hn::RebindMask(di, hn::And(in_x, in_y)), cell, set(-1)), di,
                   first + i);
     }
-    Vectors left = (Vectors{1} << (count - 1) << 1) - 1;
+    Vectors left = all_of(count);
     // Neighbours may share a cell: to read what has just been written takes long.
     for (int odd = 0; odd < 2; ++odd) {
         for (int i = odd; i < count; i += 2) {
@@ -110,8 +107,7 @@ void splat_rows(const Reprojection& reprojection, const DepthView& depth, const 
         while (width - x >= kLanes) {
             const int count = std::min(kVectors, (width - x) / kLanes);
             Vectors left = splat_together(grid, row, depths, x, count, cells);
-            for (; left; left &= left - 1)
-                splat_at(x + kLanes * static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left)));
+            for (; left; left &= left - 1) splat_at(x + kLanes * first_of(left));
             x += count * kLanes;
         }
 #endif

@@ -17,10 +17,6 @@ namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
 
-using Vectors = std::uint32_t;  // one bit for each
-constexpr int kVectors = 16;
-static_assert(kVectors % kLanes == 0, "windows are placed a vector of them at a time");
-
 struct UsualVector {
     // As in Located, and in Cells.
     HWY_ALIGN float x[kLanes], y[kLanes], a[kLanes], b[kLanes];
@@ -64,11 +60,6 @@ struct Stretch {
     UsualVector vectors[kVectors];
     Windows source, cells;
 };
-
-HWY_INLINE Vectors all_of(int count) { return (Vectors{1} << (count - 1) << 1) - 1; }
-HWY_INLINE int first_of(Vectors vectors) {
-    return static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(vectors));
-}
 
 HWY_INLINE bool none(Int bits) { return hn::AllTrue(IntTag(), hn::Eq(bits, hn::Zero(IntTag()))); }
 
