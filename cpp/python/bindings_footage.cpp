@@ -6,10 +6,13 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "xcalib/choose.hpp"
+#include "xcalib/clock_offset.hpp"
 #include "xcalib/complete_depth.hpp"
 #include "xcalib/false_colour.hpp"
+#include "xcalib/fingerprint.hpp"
 #include "xcalib/pairing.hpp"
 #include "xcalib/plane_depth.hpp"
+#include "xcalib/steady_depth.hpp"
 
 namespace xcalib {
 namespace {
@@ -105,6 +108,125 @@ of those in use. Raises InputError.)");
     m.def("nearest_depths", &nearest_depths, py::arg("references"), py::arg("used"),
           py::arg("depths"), py::arg("where"),
           "The nearest depth map in time, as match_depths() does it; depths: their times [s].");
+}
+
+void bind_clock_offset(py::module_& m) {
+    py::class_<OffsetEstimate>(m, "OffsetEstimate", "A clock offset, and what speaks for it.")
+        .def(py::init(
+                 [](double offset, bool trusted, double correlation, double contrast, double peak) {
+                     return OffsetEstimate{offset, trusted, correlation, contrast, peak};
+                 }),
+             py::arg("offset"), py::arg("trusted"), py::arg("correlation"), py::arg("contrast"),
+             py::arg("peak"))
+        .def_readonly("offset", &OffsetEstimate::offset,
+                      "By how much the source's clock is late [s]; 0 where the footage does not "
+                      "tell.")
+        .def_readonly("trusted", &OffsetEstimate::trusted, "Whether it does.")
+        .def_readonly("correlation", &OffsetEstimate::correlation,
+                      "Height of the peak, in [-1, 1].")
+        .def_readonly("contrast", &OffsetEstimate::contrast,
+                      "What it stands above the best peak elsewhere.")
+        .def_readonly("peak", &OffsetEstimate::peak, "Where the peak is [s], trusted or not.")
+        .def("line", &OffsetEstimate::line, "In one line.");
+    m.def(
+        "motion_edges",
+        [](const py::object& image) {
+            const Held held = image_of("image", image);
+            Image edges;
+            {
+                const py::gil_scoped_release unlocked;
+                edges = motion_edges(held.view);
+            }
+            return array_of(edges);
+        },
+        py::arg("image"),
+        "Magnitude of the gradient of a small gray copy, (h, 160) float32: about 1 on an edge "
+        "whatever the gain. Pixels that are not finite count as black.");
+    using EdgesInPython = std::function<py::object(int)>;
+    m.def(
+        "estimate_offset",
+        [](const std::vector<double>& references, const std::vector<double>& sources,
+           const EdgesInPython& reference_edges, const EdgesInPython& source_edges,
+           double max_offset, int max_frames) {
+            const auto edges_of = [](const EdgesInPython& given) {
+                return [&given](int index) -> std::optional<Image> {
+                    const py::object edges = given(index);
+                    if (edges.is_none()) return std::nullopt;
+                    const Held held = depth_of("edges", edges);
+                    Image out(held.view.width, held.view.height);
+                    const float* first = held.view.row<float>(0);
+                    std::copy(first, first + out.pixels.size(), out.pixels.begin());
+                    return out;
+                };
+            };
+            return estimate_offset(references, sources, edges_of(reference_edges),
+                                   edges_of(source_edges), max_offset, max_frames);
+        },
+        py::arg("references"), py::arg("sources"), py::arg("reference_edges"),
+        py::arg("source_edges"), py::arg("max_offset") = 2.0, py::arg("max_frames") = 1500,
+        R"(A constant offset between the clocks of two streams, neither registered.
+
+references, sources: times of their frames [s], never falling, each on its own clock.
+reference_edges, source_edges: motion_edges() of frame i, None where it cannot be decoded.
+max_offset: the largest looked for, either way [s]; also at most a third of the footage. max_frames:
+references asked for at most, from the middle of the footage. Raises InputError where the times do
+not overlap.)");
+
+    py::class_<RefinedOffset>(
+        m, "RefinedOffset",
+        "A clock offset chosen by how well frames register, and what speaks for it.")
+        .def_readonly("offset", &RefinedOffset::offset,
+                      "By how much the source's clock is late [s]; the middle candidate where "
+                      "nothing is told.")
+        .def_readonly("told", &RefinedOffset::told,
+                      "Whether the frames register worse at both ends of the candidates.")
+        .def_readonly("scores", &RefinedOffset::scores,
+                      "Mean NEC of the frames judged, at each candidate; empty if fewer than two "
+                      "can be.")
+        .def("line", &RefinedOffset::line, "In one line.");
+    m.def("offsets_around", &offsets_around, py::arg("guess"), py::arg("references"),
+          py::arg("sources"),
+          "Candidates for refine_offset(), from the times of both streams [s]: 6 frames of the "
+          "faster one either way, in quarters [s].");
+    py::class_<RegisteredNec>(m, "RegisteredNec",
+                              "NEC of a reference and a source frame, registered.")
+        .def(py::init<const Rig&>(), py::arg("rig"), "Rescaled to the frames.")
+        .def(
+            "__call__",
+            [](RegisteredNec& judge, const py::object& reference, const py::object& source,
+               const py::object& depth) {
+                const Held r = image_of("reference", reference), s = image_of("source", source);
+                const Held d = depth_of("depth", depth);
+                const py::gil_scoped_release unlocked;
+                return judge(r.view, s.view, d.view);
+            },
+            py::arg("reference"), py::arg("source"), py::arg("depth"),
+            "In [0, 1]; 0 where no pixel is valid. Frames of one size; depth (h, w) float32 [m], 0 "
+            "unknown.");
+    m.def("refine_offset", &refine_offset, py::arg("references"), py::arg("sources"),
+          py::arg("candidates"), py::arg("score"), py::arg("max_frames") = 12,
+          R"(Chooses among candidate offsets [s], rising, around a guess in their middle.
+
+references, sources: times of their frames [s]. score: the RegisteredNec of a reference and a source
+frame, by their indices, None where one cannot be decoded. Of the candidates that differ from the
+best by less than the frames do among each other (two standard errors of the mean), the one nearest
+to the middle is taken. max_frames: of the slower stream, spread over the footage. Raises InputError
+without candidates.)");
+}
+
+void bind_fingerprint(py::module_& m) {
+    m.def(
+        "fingerprint", [](const std::string& data) { return fingerprint(data); }, py::arg("data"),
+        "16 hexadecimal digits of a text, or of bytes: it tells changes by accident, not by "
+        "intent.");
+    m.def(
+        "rig_fingerprint", [](const Rig& rig) { return fingerprint(rig); }, py::arg("rig"),
+        "The fingerprint() of all numbers of a rig.");
+    m.def("absolute_path", &absolute_path, py::arg("path"),
+          "A path from the root, without `.` and empty parts; `..` and links stay.");
+    m.def("file_stamp", &file_stamp, py::arg("path"),
+          "Where a file is, its size, and the time of its last change; of a folder, those of all "
+          "files in it. A path that cannot be read is itself.");
 }
 
 void bind_choice(py::module_& m) {
@@ -309,12 +431,38 @@ order, not a probability. Raises InputError where nothing is known or the aspect
         py::arg("guide"), py::arg("width"), py::arg("height"),
         "The guide as gray of another size, with the contrast of dark parts raised: (height, "
         "width) float32 in [0, 1].");
+
+    py::class_<DepthSteadier>(m, "DepthSteadier",
+                              R"(Depth of a video, averaged over time along the image flow; causal.
+
+What the last frame knew is carried to this one by patch_flow() between their reference images, and
+by one forward speed for the whole frame. A pixel goes on with the running mean of its inverse depth,
+of 4 frames at most, or starts anew where depth or image around it has changed.)")
+        .def(py::init<>())
+        .def(
+            "__call__",
+            [](DepthSteadier& steadier, int index, const py::object& depth,
+               const py::object& reference, int num_threads) {
+                const Held d = depth_of("depth", depth), r = image_of("reference", reference);
+                Image out;
+                {
+                    const py::gil_scoped_release unlocked;
+                    out = steadier(index, d.view, r.view, num_threads);
+                }
+                return array_of(out);
+            },
+            py::arg("index"), py::arg("depth"), py::arg("reference"), py::arg("num_threads") = 0,
+            "Frames are to follow on each other; any other one starts anew, and passes as it is. "
+            "depth (h, w) float32 [m], 0 unknown, which stays unknown; reference: its image, of "
+            "the same aspect. The result does not depend on num_threads.");
 }
 
 }  // namespace
 
 void bind_footage(py::module_& m) {
     bind_pairing(m);
+    bind_clock_offset(m);
+    bind_fingerprint(m);
     bind_choice(m);
     bind_false_colour(m);
     bind_depth(m);

@@ -1,5 +1,6 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from numpy import float32, float64, intp, uint8
@@ -546,6 +547,118 @@ def times_of_table(text: str, table: str, names: Sequence[str]) -> list[float]:
     milliseconds, others seconds. Raises InputError that begins with table, the file's name.
     """
 
+class OffsetEstimate:
+    """A clock offset, and what speaks for it."""
+    def __init__(
+        self,
+        offset: float,
+        trusted: bool,
+        correlation: float,
+        contrast: float,
+        peak: float,
+    ) -> None: ...
+    @property
+    def offset(self) -> float:
+        """By how much the source's clock is late [s]; 0 where the footage does not tell."""
+    @property
+    def trusted(self) -> bool:
+        """Whether it does."""
+    @property
+    def correlation(self) -> float:
+        """Height of the peak, in [-1, 1]."""
+    @property
+    def contrast(self) -> float:
+        """What it stands above the best peak elsewhere."""
+    @property
+    def peak(self) -> float:
+        """Where the peak is [s], trusted or not."""
+    def line(self) -> str:
+        """In one line."""
+
+def motion_edges(image: NDArray[Any]) -> NDArray[float32]:
+    """Magnitude of the gradient of a small gray copy, (h, 160) float32: about 1 on an edge
+    whatever the gain. Pixels that are not finite count as black.
+    """
+
+def estimate_offset(
+    references: Sequence[float],
+    sources: Sequence[float],
+    reference_edges: Callable[[int], NDArray[float32] | None],
+    source_edges: Callable[[int], NDArray[float32] | None],
+    max_offset: float = 2.0,
+    max_frames: int = 1500,
+) -> OffsetEstimate:
+    """A constant offset between the clocks of two streams, neither registered.
+
+    references, sources: times of their frames [s], never falling, each on its own clock.
+    reference_edges, source_edges: motion_edges() of frame i, None where it cannot be decoded.
+    max_offset: the largest looked for, either way [s]; also at most a third of the footage.
+    max_frames: references asked for at most, from the middle of the footage. Raises
+    InputError where the times do not overlap.
+    """
+
+class RefinedOffset:
+    """A clock offset chosen by how well frames register, and what speaks for it."""
+    @property
+    def offset(self) -> float:
+        """By how much the source's clock is late [s]; the middle candidate where nothing is
+        told.
+        """
+    @property
+    def told(self) -> bool:
+        """Whether the frames register worse at both ends of the candidates."""
+    @property
+    def scores(self) -> list[float]:
+        """Mean NEC of the frames judged, at each candidate; empty if fewer than two can be."""
+    def line(self) -> str:
+        """In one line."""
+
+def offsets_around(
+    guess: float, references: Sequence[float], sources: Sequence[float]
+) -> list[float]:
+    """Candidates for refine_offset(), from the times of both streams [s]: 6 frames of the faster
+    one either way, in quarters [s].
+    """
+
+class RegisteredNec:
+    """NEC of a reference and a source frame, registered."""
+    def __init__(self, rig: Rig) -> None:
+        """Rescaled to the frames."""
+    def __call__(self, reference: NDArray[Any], source: NDArray[Any], depth: NDArray[Any]) -> float:
+        """In [0, 1]; 0 where no pixel is valid. Frames of one size; depth (h, w) float32 [m], 0
+        unknown.
+        """
+
+def refine_offset(
+    references: Sequence[float],
+    sources: Sequence[float],
+    candidates: Sequence[float],
+    score: Callable[[int, int], float | None],
+    max_frames: int = 12,
+) -> RefinedOffset:
+    """Chooses among candidate offsets [s], rising, around a guess in their middle.
+
+    references, sources: times of their frames [s]. score: the RegisteredNec of a reference
+    and a source frame, by their indices, None where one cannot be decoded. Of the candidates
+    that differ from the best by less than the frames do among each other (two standard errors
+    of the mean), the one nearest to the middle is taken. max_frames: of the slower stream,
+    spread over the footage. Raises InputError without candidates.
+    """
+
+def fingerprint(data: str | bytes) -> str:
+    """16 hexadecimal digits of a text, or of bytes: it tells changes by accident, not by intent."""
+
+def rig_fingerprint(rig: Rig) -> str:
+    """The fingerprint() of all numbers of a rig."""
+
+def absolute_path(path: str | PathLike[str]) -> Path:
+    """A path from the root, without `.` and empty parts; `..` and links stay."""
+
+def file_stamp(path: str | PathLike[str]) -> list[str]:
+    """Where a file is, its size, and the time of its last change; of a folder, those of all
+    files in it. A path that cannot be read is itself.
+    """
+
 def median_period(times: Sequence[float]) -> float:
     """Median distance of times [s]; 0 for a single one."""
 
@@ -801,6 +914,27 @@ def compressed_guide(guide: NDArray[Any], width: int, height: int) -> NDArray[fl
     """The guide as gray of another size, with the contrast of dark parts raised: (height, width)
     float32 in [0, 1].
     """
+
+class DepthSteadier:
+    """Depth of a video, averaged over time along the image flow; causal.
+
+    What the last frame knew is carried to this one by patch_flow() between their reference
+    images, and by one forward speed for the whole frame. A pixel goes on with the running
+    mean of its inverse depth, of 4 frames at most, or starts anew where depth or image around
+    it has changed.
+    """
+    def __init__(self) -> None: ...
+    def __call__(
+        self,
+        index: int,
+        depth: NDArray[Any],
+        reference: NDArray[Any],
+        num_threads: int = 0,
+    ) -> NDArray[float32]:
+        """Frames are to follow on each other; any other one starts anew, and passes as it is.
+        depth (h, w) float32 [m], 0 unknown, which stays unknown; reference: its image, of the
+        same aspect. The result does not depend on num_threads.
+        """
 
 class Evaluation:
     """Scores of the registered and the unregistered source."""

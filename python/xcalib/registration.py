@@ -6,8 +6,6 @@ What is written is noted in a `Journal`; frames that it tells of are not made ag
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import json
 import os
 import signal
 import sys
@@ -23,10 +21,11 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ._core import Registrar, Rig
+from ._core import Registrar, Rig, absolute_path, file_stamp, fingerprint, rig_fingerprint
 from .depth import Depth, files_of, is_parallel
 from .depth.conditioning import SteadyDepth
-from .footage import Stream, journal_of, open_sink
+from .footage import Stream, is_video, journal_of, open_sink
+from .footage.encoder import encoder_name
 from .footage.pairing import median_period
 from .footage.writer import Sink, valid_pixels
 from .frames import Image, overlay
@@ -112,6 +111,8 @@ def run_registration(
     registrar = Registrar(fitted, options.threads, options.nearest, options.occlusion)
     keys = frame_keys(frames)
     made_with = described(rig, options, inputs or {})
+    if is_video(output):
+        made_with["encoder"] = encoder_name()
     with (
         Journal(journal_of(output), made_with, options.overwrite) as journal,
         Interrupts() as interrupts,
@@ -247,16 +248,7 @@ def frame_keys(frames: Frames) -> list[str]:
     Depth that depends on the frames before makes the name depend on them as well.
     """
 
-    @cache
-    def stamp(path: Path) -> tuple[str, ...]:
-        try:
-            files = sorted(path.iterdir()) if path.is_dir() else [path]
-            about = [(file.name, file.stat()) for file in files]
-        except OSError:
-            return (str(path),)
-        whole = [f"{name} {stat.st_size} {stat.st_mtime_ns}" for name, stat in about]
-        return (str(path.absolute()), *whole)
-
+    stamp = cache(file_stamp)
     keys: list[str] = []
     steady = is_steady(frames.depth)
     for index in range(len(frames)):
@@ -268,33 +260,24 @@ def frame_keys(frames: Frames) -> list[str]:
             parts += stamp(file)
         if steady and keys:
             parts.append(keys[-1])
-        keys.append(hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16])
+        keys.append(fingerprint("\n".join(parts)))
     return keys
 
 
 def described(rig: Rig, options: RegistrationOptions, inputs: Mapping[str, Any]) -> dict[str, str]:
     """All that an output depends on, but for the frames and how fast it is made."""
-    cameras = [
-        [getattr(camera, name) for name in ("width", "height", "fx", "fy", "cx", "cy", "skew")]
-        for camera in (rig.reference, rig.source)
-    ]
-    relative = rig.relative_depth
-    numbers = [
-        *(cameras, rig.R.tolist(), rig.t.tolist()),
-        None if relative is None else [relative.scale, relative.shift],
-    ]
     text = {
         "xcalib": version("xcalib-rgbt"),
-        "rig": hashlib.sha256(json.dumps(numbers).encode()).hexdigest()[:16],
+        "rig": rig_fingerprint(rig),
         "overlay": str(options.overlays),
         "nearest": str(options.nearest),
         "occlusion": options.occlusion,
     }
     for name, value in inputs.items():
         path = isinstance(value, Path) or (name == "depth_spec" and value != "plane")
-        text[name] = str(Path(value).absolute() if path else value)
+        text[name] = str(absolute_path(value) if path else value)
         if path and Path(value).is_file() and name not in ("reference", "source", "depth_spec"):
-            text[name] += f" ({hashlib.sha256(Path(value).read_bytes()).hexdigest()[:16]})"
+            text[name] += f" ({fingerprint(Path(value).read_bytes())})"
     return text
 
 

@@ -34,6 +34,11 @@ _PIXELS = {("uint8", 2): "gray", ("uint16", 2): "gray16le", ("uint8", 3): "bgr24
 _LOSSLESS = {"gray": "gray", "gray16le": "gray16le", "bgr24": "bgr0"}
 
 
+def encoder_name() -> str:
+    """The library that compresses, and its version: parts of a video are of one."""
+    return f"libavcodec {'.'.join(map(str, av.library_versions['libavcodec']))}"
+
+
 def check_image(path: Path, image: Image) -> None:
     """Raise `InputError` if a video of this name cannot hold the image.
 
