@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 
 from xcalib import Rig, synthetic
-from xcalib.cli import cli
+from xcalib.cli import cli as python_command
+
+ROOT = Path(__file__).resolve().parents[1]
+Process = subprocess.CompletedProcess[str]
 
 FRAMES = 6
 WIDTH = 320
@@ -19,7 +24,7 @@ WIDTH = 320
 
 def run(*arguments: str | int | Path) -> Result:
     """Run the ``xcalib`` command in this process."""
-    return CliRunner().invoke(cli, [str(argument) for argument in arguments])
+    return CliRunner().invoke(python_command, [str(argument) for argument in arguments])
 
 
 def small(rig: Rig) -> Rig:
@@ -68,6 +73,42 @@ def xcalib_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real data at {folder} (set XCALIB_DATA)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def binary() -> Path:
+    """xcalib-cli: XCALIB_CLI, or where `make` builds it."""
+    built = ROOT / "build" / "release" / "cpp" / "cli" / "xcalib-cli"
+    path = Path(os.environ.get("XCALIB_CLI", built)).resolve()
+    if not path.is_file():
+        pytest.skip(f"no {path}: `make cli`, or name it in XCALIB_CLI")
+    return path
+
+
+@pytest.fixture
+def cli(binary: Path) -> Callable[..., Process]:
+    """Run xcalib-cli."""
+
+    def call(*arguments: Any, **more: Any) -> Process:
+        command = [str(binary), *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, check=False, **more)
+
+    return call
+
+
+@pytest.fixture
+def both(cli: Callable[..., Process]) -> Callable[..., tuple[Process, Result]]:
+    """Run both commands, each with ``OUT`` in its arguments replaced by a name of its own."""
+
+    def call(*arguments: Any) -> tuple[Process, Result]:
+        ours, theirs = (
+            [str(argument).replace("OUT", name) for argument in arguments] for name in ("c", "p")
+        )
+        first, second = cli(*ours), run(*theirs)
+        assert first.returncode == second.exit_code, first.stderr + second.output
+        return first, second
+
+    return call
 
 
 @pytest.fixture

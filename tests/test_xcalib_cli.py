@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import struct
 import subprocess
@@ -18,51 +19,12 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-from conftest import FRAMES, run
+from conftest import FRAMES, Process, run
 from xcalib import Rig
+from xcalib.cli import cli as python_command
 from xcalib.depth import read_depth
 from xcalib.frames import Image, list_files, read_image, write_image
 from xcalib.thermal import KNOWN
-
-ROOT = Path(__file__).resolve().parents[1]
-BUILT = ROOT / "build" / "release" / "cpp" / "cli" / "xcalib-cli"
-
-Process = subprocess.CompletedProcess[str]
-
-
-@pytest.fixture(scope="session")
-def binary() -> Path:
-    """XCALIB_CLI, or where `make` builds it."""
-    path = Path(os.environ.get("XCALIB_CLI", BUILT)).resolve()
-    if not path.is_file():
-        pytest.skip(f"no {path}: `make cli`, or name it in XCALIB_CLI")
-    return path
-
-
-@pytest.fixture
-def cli(binary: Path) -> Callable[..., Process]:
-    """Run xcalib-cli."""
-
-    def call(*arguments: Any, **more: Any) -> Process:
-        command = [str(binary), *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, check=False, **more)
-
-    return call
-
-
-@pytest.fixture
-def both(cli: Callable[..., Process]) -> Callable[..., tuple[Process, Result]]:
-    """Run both commands, each with ``OUT`` in its arguments replaced by a name of its own."""
-
-    def call(*arguments: Any) -> tuple[Process, Result]:
-        ours, theirs = (
-            [str(argument).replace("OUT", name) for argument in arguments] for name in ("c", "p")
-        )
-        first, second = cli(*ours), run(*theirs)
-        assert first.returncode == second.exit_code, first.stderr + second.output
-        return first, second
-
-    return call
 
 
 def folders(scene: Path) -> tuple[str | Path, ...]:
@@ -98,6 +60,7 @@ def assert_same_pixels(first: Path, second: Path, count: int = FRAMES) -> None:
         ("--search", "off", "--flow", "patch", "--reference-hfov", 50),
         ("--solver", "adam", "--frames", 2),
         ("--source-intrinsics", "277,278,105,85.5", "--optimize-reference"),
+        ("--depth-steady", "--choose", "spread"),
     ],
 )
 def test_calibrate_writes_the_same_rig(
@@ -180,7 +143,16 @@ def test_json_lines_tell_progress_and_result(
 # -- register
 
 
-@pytest.mark.parametrize("more", [(), ("--occlusion", "hide"), ("--nearest", "--threads", 1)])
+@pytest.mark.parametrize(
+    "more",
+    [
+        (),
+        ("--occlusion", "hide"),
+        ("--nearest", "--threads", 1),
+        ("--depth-steady",),
+        ("--depth-steady", "--complete"),
+    ],
+)
 def test_register_writes_the_same_frames(
     both: Callable[..., tuple[Process, Result]], rendered: Path, tmp_path: Path, more: Any
 ) -> None:
@@ -358,6 +330,32 @@ def test_bench_times_frames(cli: Callable[..., Process], rendered: Path) -> None
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--refine-plane"),
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--initial", "no.yaml"),
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "1"),
+        ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "auto"),
+        (
+            "register",
+            "rig.yaml",
+            "visible",
+            "thermal",
+            "--depth",
+            "depth",
+            "-o",
+            "OUT",
+            "--time-offset",
+            "auto",
+            "--pair",
+            "name",
+        ),
+        (
+            "calibrate",
+            "visible",
+            "thermal",
+            "--depth",
+            "plane",
+            "-o",
+            "r",
+            "--refine-plane",
+            "--depth-steady",
+        ),
         (
             *("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r"),
             *("--reference-intrinsics", "1,1,0,0", "--optimize-reference"),
@@ -433,8 +431,6 @@ def test_both_refuse_with_the_same_line(
         (("--depth", "stereo:right"), "stereo:right"),
         (("--depth", "drive.mcap#/depth"), "drive.mcap"),
         (("--depth", "depth", "--lidar-calibration", "x"), "--lidar-calibration"),
-        (("--depth", "depth", "--depth-steady"), "--depth-steady"),
-        (("--depth", "depth", "--time-offset", "auto"), "--time-offset auto"),
         (("--depth", "depth", "--flow", "raft.onnx"), "raft.onnx"),
         (("--depth", "depth", "--providers", "cuda"), "--providers"),
     ],
@@ -476,10 +472,23 @@ def test_help_and_version(cli: Callable[..., Process]) -> None:
         result = cli(command, "--help")
         assert result.returncode == 0
         assert f"{command}" in result.stdout
-    # The options of the Python command are all there.
-    text = cli("calibrate", "--help").stdout
-    for option in ("--choose", "--explain", "--refine-plane", "--report", "--source-colormap"):
-        assert option in text
+
+
+# What the Python command alone does, docs/cli.md.
+ONLY_PYTHON = {
+    *("--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"),
+    *("--lidar-calibration", "--stereo-calibration"),
+    *("--stereo-baseline", "--stereo-focal", "--stereo-doffs"),
+}
+
+
+@pytest.mark.parametrize("command", ["calibrate", "register", "evaluate", "inspect"])
+def test_the_options_are_those_of_the_python_command(
+    cli: Callable[..., Process], command: str
+) -> None:
+    theirs = {flag for option in python_command.commands[command].params for flag in option.opts}
+    ours = set(re.findall(r"-[\w-]+", cli(command, "--help").stdout))
+    assert {flag for flag in theirs - ours if flag.startswith("-")} == ONLY_PYTHON & theirs
 
 
 def test_nothing_valid_is_not_trusted(

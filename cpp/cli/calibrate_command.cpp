@@ -63,7 +63,7 @@ std::vector<int> choose_by_content(const Frames& frames, const Arguments& argume
     const std::vector<int> drawn =
         frames_to_look_at(frames.size(), arguments.options.max_frames, arguments.options.seed);
     // Depth counts where it is cheap.
-    const bool with_depth = !arguments.frames.depth.complete;
+    const bool with_depth = !arguments.frames.depth.complete && !arguments.frames.depth.steady;
     std::vector<Candidate> candidates;
     for (const int index : drawn) {
         try {
@@ -230,10 +230,11 @@ void check(const Arguments& a) {
         throw InputError("--explain tells of --choose informed, expected that too");
     if (a.refine_plane && a.frames.depth.spec != "plane")
         throw InputError("--refine-plane goes with --depth plane, not " + a.frames.depth.spec);
-    if (a.refine_plane && a.frames.depth.complete)
-        throw InputError(
-            "--refine-plane fits the plane itself, which --complete would change; expected only"
-            " one of them");
+    for (const auto& [asked, flag] : {std::pair(a.frames.depth.complete, "--complete"),
+                                      std::pair(a.frames.depth.steady, "--depth-steady")})
+        if (a.refine_plane && asked)
+            throw InputError("--refine-plane fits the plane itself, which " + std::string(flag) +
+                             " would change; expected only one of them");
     const bool is_network = a.flow.size() > 5 && a.flow.substr(a.flow.size() - 5) == ".onnx";
     if (is_network)
         throw InputError("--flow " + a.flow +

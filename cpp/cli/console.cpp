@@ -73,6 +73,10 @@ void Console::error(int code, const std::string& text) {
 
 void Console::progress(const std::string& stage, double fraction) {
     if (interrupted) throw Interrupted();
+    show(stage, fraction);
+}
+
+void Console::show(const std::string& stage, double fraction) {
     const int percent = static_cast<int>(100 * fraction);
     {
         const std::lock_guard lock(mutex_);

@@ -24,7 +24,7 @@ class NotTrusted : public std::runtime_error {
 
 class Interrupted : public std::runtime_error {
    public:
-    Interrupted() : std::runtime_error("interrupted") {}
+    explicit Interrupted(const std::string& state = "interrupted") : std::runtime_error(state) {}
 };
 
 // Set by Ctrl-C and by a request to end.
@@ -41,7 +41,9 @@ class Console {
     void note(const std::string& text);
     void warn(const std::string& text);
     void error(int code, const std::string& text);
-    // `fraction` of `stage`, (0, 1]; throws Interrupted where asked to end.
+    // `fraction` of `stage`, (0, 1].
+    void show(const std::string& stage, double fraction);
+    // The same; throws Interrupted where asked to end.
     void progress(const std::string& stage, double fraction);
 
    private:

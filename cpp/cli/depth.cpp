@@ -7,6 +7,7 @@
 #include "footage.hpp"
 #include "npy.hpp"
 #include "xcalib/complete_depth.hpp"
+#include "xcalib/steady_depth.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -24,7 +25,7 @@ std::string type_name(int depth) {
 class Plane : public Depth {
    public:
     explicit Plane(const PlaneDepth& plane) : plane_(plane) {}
-    cv::Mat operator()(int, const cv::Mat& reference) const override {
+    cv::Mat operator()(int, const cv::Mat& reference) override {
         return as_mat(plane_(reference.cols, reference.rows));
     }
 
@@ -35,7 +36,7 @@ class Plane : public Depth {
 class Files : public Depth {
    public:
     Files(std::vector<Path> paths, double scale) : paths_(std::move(paths)), scale_(scale) {}
-    cv::Mat operator()(int index, const cv::Mat& reference) const override {
+    cv::Mat operator()(int index, const cv::Mat& reference) override {
         const Path& path = paths_[static_cast<std::size_t>(index)];
         cv::Mat depth = read_depth(path, scale_);
         const long difference = std::labs(static_cast<long>(depth.cols) * reference.rows -
@@ -46,20 +47,40 @@ class Files : public Depth {
                              "; expected the same aspect");
         return depth;
     }
+    std::vector<Path> files(int index) const override {
+        return {paths_[static_cast<std::size_t>(index)]};
+    }
 
    private:
     std::vector<Path> paths_;
     double scale_;
 };
 
+class Steadied : public Depth {
+   public:
+    explicit Steadied(DepthPointer depth) : depth_(std::move(depth)) {}
+    cv::Mat operator()(int index, const cv::Mat& reference) override {
+        const cv::Mat depth = (*depth_)(index, reference);
+        return as_mat(steadier_(index, view_of(depth), view_of(reference)));
+    }
+    std::vector<Path> files(int index) const override { return depth_->files(index); }
+    bool steadied() const override { return true; }
+
+   private:
+    DepthPointer depth_;
+    DepthSteadier steadier_;
+};
+
 class Completed : public Depth {
    public:
     Completed(DepthPointer depth, double min_confidence)
         : depth_(std::move(depth)), min_confidence_(min_confidence) {}
-    cv::Mat operator()(int index, const cv::Mat& reference) const override {
+    cv::Mat operator()(int index, const cv::Mat& reference) override {
         const cv::Mat depth = (*depth_)(index, reference);
         return as_mat(completed(view_of(depth), view_of(reference), min_confidence_));
     }
+    std::vector<Path> files(int index) const override { return depth_->files(index); }
+    bool steadied() const override { return depth_->steadied(); }
 
    private:
     DepthPointer depth_;
@@ -143,8 +164,10 @@ DepthPointer open_depth(const DepthArguments& arguments, const FrameList& refere
                         const std::vector<int>& used) {
     arguments.plane.validate();
     DepthPointer depth = open_given(arguments, references, used);
-    if (!arguments.complete) return depth;
-    return std::make_shared<Completed>(std::move(depth), arguments.completion_confidence);
+    if (arguments.steady) depth = std::make_shared<Steadied>(std::move(depth));
+    if (arguments.complete)
+        depth = std::make_shared<Completed>(std::move(depth), arguments.completion_confidence);
+    return depth;
 }
 
 }  // namespace xcalib::cli

@@ -22,14 +22,18 @@ cv::Mat read_depth(const Path& file, double scale);
 class Depth {
    public:
     virtual ~Depth() = default;
-    virtual cv::Mat operator()(int index, const cv::Mat& reference) const = 0;
+    virtual cv::Mat operator()(int index, const cv::Mat& reference) = 0;
+    virtual std::vector<Path> files(int) const { return {}; }  // that a frame's is made from
+    // Whether frames must come one by one, in order: those before are a part of each.
+    virtual bool steadied() const { return false; }
 };
 
-using DepthPointer = std::shared_ptr<const Depth>;
+using DepthPointer = std::shared_ptr<Depth>;
 
 DepthPointer plane_depth(const PlaneDepth& plane);
 
-// What --depth names, for the frames `used` of the references, conditioned as asked for.
+// What --depth names, for the frames `used` of the references, conditioned as asked for: steadied,
+// then completed.
 DepthPointer open_depth(const DepthArguments& arguments, const FrameList& references,
                         const std::vector<int>& used);
 

@@ -39,6 +39,7 @@ class Pages : public Stream {
     std::string where(int index) const override {
         return path_.string() + " page " + std::to_string(index);
     }
+    Path file(int) const override { return path_; }
 
    private:
     cv::Mat read(int index) override {
@@ -63,6 +64,7 @@ class Changed : public Stream {
     int size() const override { return stream_->size(); }
     std::string name(int index) const override { return stream_->name(index); }
     std::string where(int index) const override { return stream_->where(index); }
+    Path file(int index) const override { return stream_->file(index); }
     bool concurrent() const override { return stream_->concurrent(); }
 
    protected:

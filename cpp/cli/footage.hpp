@@ -22,6 +22,7 @@ class Stream {
     virtual int size() const = 0;
     virtual std::string name(int index) const = 0;   // of a file made from the frame, no suffix
     virtual std::string where(int index) const = 0;  // for messages
+    virtual Path file(int index) const = 0;          // that the frame is in
     virtual std::vector<Path> paths() const { return {}; }  // where frames are files
     virtual bool concurrent() const { return false; }       // may several threads read?
     // [s] of the frames on the clock of this stream, never falling; none where unknown.
@@ -49,6 +50,7 @@ class ImageFiles : public Stream {
     int size() const override { return static_cast<int>(paths_.size()); }
     std::string name(int index) const override { return at(index).stem().string(); }
     std::string where(int index) const override { return at(index).string(); }
+    Path file(int index) const override { return at(index); }
     std::vector<Path> paths() const override { return paths_; }
     bool concurrent() const override { return true; }
 
@@ -66,6 +68,7 @@ class Picked : public Stream {
     int size() const override { return static_cast<int>(indices_.size()); }
     std::string name(int index) const override { return stream_->name(at(index)); }
     std::string where(int index) const override { return stream_->where(at(index)); }
+    Path file(int index) const override { return stream_->file(at(index)); }
     bool concurrent() const override { return stream_->concurrent(); }
 
    private:

@@ -16,7 +16,6 @@ struct Frame {
 struct Frames {
     StreamPointer references, sources;
     DepthPointer depth;
-    bool is_plane = false;
 
     int size() const { return references->size(); }
     Frame read(int index) const;

@@ -7,6 +7,7 @@
 #include "depth_stream.hpp"
 #include "registration.hpp"
 #include "xcalib/complete_depth.hpp"
+#include "xcalib/steady_depth.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -37,8 +38,11 @@ Totals register_live(const RegisterArguments& a, const Rig& rig, Console& consol
     std::unique_ptr<DepthStream> stream;
     if (a.depth_fd >= 0) stream = std::make_unique<DepthStream>(a.depth_fd);
     const DepthPointer plane = plane_depth(a.frames.depth.plane);
-    const std::unique_ptr<Sink> sink = open_sink(a.output, a.rate);
+    const std::unique_ptr<Sink> sink = open_sink(a.output, a.rate, nullptr);
+    sink->begin({});
+    std::vector<FrameName> names;
     std::unique_ptr<Registrar> registrar;
+    DepthSteadier steadier;
     Totals totals;
     const auto start = Clock::now();
     while (!interrupted && (a.max_frames == 0 || totals.frames < a.max_frames)) {
@@ -49,12 +53,14 @@ Totals register_live(const RegisterArguments& a, const Rig& rig, Console& consol
         if (stream) map = a.depth_sync == "each" ? stream->next() : stream->latest();
         else map = DepthMap{(*plane)(0, reference), 0};
         if (!map) break;
+        const auto conditioned = [&map](const Image& depth) {
+            map->depth = cv::Mat(depth.pixels, true).reshape(1, depth.height);
+        };
+        if (a.frames.depth.steady)
+            conditioned(steadier(totals.frames, view_of(map->depth), view_of(reference)));
         if (a.frames.depth.complete)
-            map->depth = cv::Mat(completed(view_of(map->depth), view_of(reference),
-                                           a.frames.depth.completion_confidence)
-                                     .pixels,
-                                 true)
-                             .reshape(1, map->depth.rows);
+            conditioned(completed(view_of(map->depth), view_of(reference),
+                                  a.frames.depth.completion_confidence));
         if (!registrar)
             registrar = std::make_unique<Registrar>(
                 fitted(rig, reference.cols, reference.rows, source.cols, source.rows), a.options);
@@ -62,9 +68,10 @@ Totals register_live(const RegisterArguments& a, const Rig& rig, Console& consol
         const Registered result = registered(*registrar, reference, source, map->depth, a.overlays);
         const double took = milliseconds_since(before);
         const std::string name = name_of(totals.frames);
-        sink->write(name, result);
+        names.push_back({name, name});
+        sink->write(totals.frames, names.back(), result);
         const long pixels = static_cast<long>(result.mask.total());
-        const long valid = pixels - cv::countNonZero(result.mask);
+        const long valid = valid_pixels(result.mask);
         Json event{{"name", name},
                    {"valid_share", static_cast<double>(valid) / static_cast<double>(pixels)},
                    {"register_ms", took}};
@@ -78,7 +85,7 @@ Totals register_live(const RegisterArguments& a, const Rig& rig, Console& consol
     if (totals.frames == 0)
         throw std::runtime_error("no frame came from " + a.frames.reference + ", " +
                                  a.frames.source + (stream ? " and the depth stream" : ""));
-    sink->close();
+    sink->finish(names, [] {});
     return totals;
 }
 

@@ -15,7 +15,13 @@ namespace {
 
 using namespace xcalib::cli;
 
-void ask_to_end(int) { interrupted = true; }
+// Between two frames it does no harm; a second one is not held back.
+void ask_to_end(int signal) {
+    if (interrupted.exchange(true)) {
+        std::signal(signal, SIG_DFL);
+        std::raise(signal);
+    }
+}
 
 constexpr const char* kAbout =
     "Calibrate a fixed pair of cameras, visible and thermal, and register their frames.\n\n"
@@ -55,8 +61,9 @@ int main(int argc, char** argv) {
     setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
     setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 0);  // OpenCV reads EXR on request only
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-    std::signal(SIGINT, ask_to_end);
-    std::signal(SIGTERM, ask_to_end);
+    for (const int signal : {SIGINT, SIGTERM})
+        if (std::signal(signal, SIG_IGN) != SIG_IGN) std::signal(signal, ask_to_end);  // nohup
+    std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error like a full disk
     Console console;
     try {
         const int code = run(argc, argv, console);

@@ -8,11 +8,8 @@
 namespace xcalib::cli {
 namespace {
 
-double seconds(const std::string& text) {
-    if (text == "auto")
-        throw InputError(
-            "--time-offset auto: a clock offset is estimated by the Python command, `xcalib`; it"
-            " prints the seconds to give here");
+std::optional<double> seconds(const std::string& text) {
+    if (text == "auto") return std::nullopt;
     std::size_t used = 0;
     double value = NAN;
     try {
@@ -48,6 +45,8 @@ void add_depth(CLI::App& command, DepthArguments& arguments) {
            "Plane: horizontal field of view of the reference camera [deg].");
     number("--plane-roll", arguments.plane.roll_deg, "DEG",
            "Plane: how far the horizon falls towards the right [deg].");
+    command.add_flag("--depth-steady", arguments.steady,
+                     "Average depth over consecutive frames of a video.");
     command.add_flag("--complete", arguments.complete, "Fill unknown depth along image edges.");
     number("--completion-confidence", arguments.completion_confidence, "F",
            "Complete: filled pixels below this confidence stay unknown, 0 to 1.");
@@ -59,15 +58,6 @@ void add_depth(CLI::App& command, DepthArguments& arguments) {
     add_python_only(
         command, {"--stereo-calibration", "--stereo-baseline", "--stereo-focal", "--stereo-doffs"},
         "stereo partners are matched");
-    command
-        .add_flag_callback(
-            "--depth-steady",
-            [] {
-                throw InputError(
-                    "--depth-steady: depth is averaged over time by the Python command, `xcalib`");
-            },
-            "")
-        ->group("");
 }
 
 void add_footage(CLI::App& command, FrameArguments& arguments) {
@@ -81,7 +71,8 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
         .add_option_function<std::string>(
             "--time-offset",
             [&arguments](const std::string& text) { arguments.time_offset = seconds(text); },
-            "By how much the source's clock is late [s].")
+            "By how much the source's clock is late [s], or `auto`: from the footage, and from its"
+            " registration where a rig is given.")
         ->type_name("S")
         ->default_str("0");
     command

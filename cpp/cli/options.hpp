@@ -18,7 +18,7 @@ struct DepthArguments {
     std::string spec;
     double scale = 1.0 / 256;  // metres per count of a 16-bit PNG
     PlaneDepth plane;
-    bool complete = false;
+    bool steady = false, complete = false;
     double completion_confidence = kCompletionConfidence;
 };
 
@@ -26,7 +26,7 @@ struct FrameArguments {
     std::string reference, source;
     DepthArguments depth;
     std::string pairing = "auto";
-    double time_offset = 0.0;
+    std::optional<double> time_offset = 0.0;  // [s]; none: estimated
     std::optional<double> max_gap;
     std::string reference_times, source_times;
 };

@@ -42,6 +42,7 @@ class Video : public Stream {
     std::string where(int index) const override {
         return path_.string() + " frame " + std::to_string(index);
     }
+    Path file(int) const override { return path_; }
 
    private:
     void open() {
