@@ -705,6 +705,23 @@ def test_a_good_initial_rig_is_refined_without_a_search(
     assert np.nanmedian(errors) < 0.5
 
 
+@pytest.mark.parametrize("off", [(-0.6, 0.1, 0.1), (0.3, -0.4, 0.0)])
+def test_a_wrong_initial_translation_is_not_kept(
+    frames: list[synthetic.Frame], truth: Rig, off: tuple[float, float, float]
+) -> None:
+    """Half a metre off moves the images by more than 10 px: two frames must tell it."""
+    start = Rig(truth.reference, truth.source, truth.R, truth.t + off)
+    result = xcalib.calibrate(*lists_of(frames[:2]), initial=start)
+    errors, before = (
+        [synthetic.end_point_error(rig, truth, frame.depth) for frame in frames[:2]]
+        for rig in (result.rig, start)
+    )
+    assert np.nanmedian(before) > 10
+    assert np.nanmedian(errors) < 0.5
+    assert result.converged
+    np.testing.assert_array_equal(result.rig.reference.K, truth.reference.K)
+
+
 def test_an_exception_in_progress_ends_the_calibration(frames: list[synthetic.Frame]) -> None:
     class Enough(Exception):
         pass

@@ -290,8 +290,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         schedule(images.references[0].width, images.references[0].height, options.parts);
     const int placing =
         schedule(images.references[0].width, images.references[0].height, {})[0].factor;
-    const bool focal_free =
-        !options.reference_camera && !options.reference_hfov_deg && !options.source_camera;
+    const bool focal_free = !initial && !options.reference_camera && !options.reference_hfov_deg &&
+                            !options.source_camera;
     // Placing costs hundreds of evaluations: fewer frames tell enough.
     const WorkingImages few = images.spread(kFew);
     const InverseDepths inverse = inverse_depths(few.pyramid.at(kCoarse));
@@ -305,12 +305,14 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         Candidate candidate;
         candidate.rig = peak.rig;
         candidate.entry = out.candidates.size();
-        if (initial) candidate.rig.source_from_reference.translation = initial->t();
+        // The search sees one displacement for all depths: where the middle depth is, it holds with
+        // the given translation too.
+        if (searches && initial)
+            candidate.rig = with_parallax(peak.rig, initial->t(), inverse.median);
         const Level level = make_level(few, placing, candidate.rig, num_threads);
-        const bool placed = searches && !initial;
-        if (placed) place(level, inverse, focal_free, options, candidate);
+        if (searches) place(level, inverse, focal_free, options, candidate);
         const NecValue value = pooled(level, candidate.rig, num_threads);
-        if (!placed) candidate.merit = merit(value);
+        if (!searches) candidate.merit = merit(value);
         candidate.share_limit = 0.8 * value.valid_share;
         candidates.push_back(candidate);
         out.candidates.push_back(entry);
