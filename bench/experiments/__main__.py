@@ -1,6 +1,7 @@
 """The paper's experiments on data at hand, and three more: one command each.
 
-    python bench/experiments 1            # 1 to 9, "rest" (what is left of the residual), or "all"
+    python bench/experiments 1            # 1 to 9, "rest" (what is left of the residual),
+                                          # "refine" (each frame anew), or "all"
     python bench/experiments 3 --quick    # seconds, on next to nothing: only to see that it runs
 
 Tables (Markdown, CSV) and plots go to a results folder; a full run also rewrites its tables between
@@ -29,6 +30,7 @@ EXPERIMENTS = {
     "8": "few_frames",
     "9": "nominal",
     "rest": "rest",
+    "refine": "refinement",
 }
 
 

@@ -80,6 +80,48 @@ def neighbours(frames: list[Patches], distance: int) -> tuple[float, float]:
     return tuple(float(np.corrcoef(a[:, k], b[:, k])[0, 1]) for k in (0, 1))
 
 
+def parallax(rig: xcalib.Rig, p: Patches) -> np.ndarray:
+    """What a relative change of its depth moves each patch by, to first order [px]."""
+    rays = np.column_stack([p.at, np.ones(len(p.at))]) @ np.linalg.inv(rig.reference.K).T
+    baseline = rig.source.K @ rig.t
+    inverse = p.inverse[:, None]
+    at = rays @ (rig.source.K @ rig.R).T + inverse * baseline
+    slope = inverse * (baseline[:2] - at[:, :2] / at[:, 2:] * baseline[2]) / at[:, 2:]
+    return slope * rig.reference.fx / rig.source.fx
+
+
+def less(shift: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Without what lies along the vectors `most`, up to their length either way."""
+    length = np.maximum(np.linalg.norm(most, axis=1, keepdims=True), 1e-9)
+    unit = most / length
+    return shift - unit * np.clip((shift * unit).sum(axis=1, keepdims=True), -length, length)
+
+
+def without_neighbours(p: Patches, size: tuple[int, int], degree: int) -> np.ndarray:
+    """Less the frame's own field as patches that share no pixel with the block tell it."""
+    block = (p.at[:, 0] // 110 + 10 * (p.at[:, 1] // 110)).astype(int)
+    a, left = basis(p, size, degree, False), p.shift.copy()
+    for b in np.unique(block):
+        here = np.nonzero(block == b)[0]
+        far = np.abs(p.at[:, None] - p.at[here][None]).max(axis=-1).min(axis=1) >= 48
+        if far.sum() > 2 * a.shape[1]:
+            left[here] -= a[here] @ robust_fit(a[far], p.shift[far])
+    return left
+
+
+def systematic_by_chance(frames: list[Patches], size: tuple[int, int]) -> float:
+    """The systematic residual of the same patches, their signs drawn: median of 200."""
+    rng = np.random.default_rng(0)
+    found = []
+    for _ in range(200):
+        drawn = [
+            metrics.PatchResidual(p.at, p.shift * rng.choice([-1, 1], (len(p.at), 1)))
+            for p in frames
+        ]
+        found.append(systematic(drawn, size))
+    return float(np.median(found))
+
+
 def own_noise(results: Results) -> list[str]:
     """What the measure says of rendered nights of that size, registered by the true rig."""
     rig = synthetic.demo_rig().resized(583, 473, 579, 477)
@@ -144,8 +186,24 @@ def run(results: Results, part: str | None) -> None:
             label,
             [p.shift - a @ robust_fit(a, p.shift) for p, a in zip(judged, own, strict=True)],
         )
+    for label, degree in (("shift", 0), ("affine", 1)):
+        row(
+            f"its own {label}, from patches that share no pixel",
+            [without_neighbours(p, size, degree) for p in judged],
+        )
+    moves = [0.1 * parallax(registrar.rig, p) for p in judged]
+    row(
+        "what 10 % of its depth can take: bound",
+        [less(p.shift, m) for p, m in zip(judged, moves, strict=True)],
+    )
+    row(
+        "as much across, which no depth moves: control",
+        [less(p.shift, m[:, ::-1] * (-1, 1)) for p, m in zip(judged, moves, strict=True)],
+    )
     row("all along the baseline (x) taken away (depth): bound", [p.shift * (0, 1) for p in judged])
     row("all across it (y) taken away: bound", [p.shift * (1, 0) for p in judged])
+    chance = f"{systematic_by_chance(judged, size):.2f}"
+    rows.append(["*signs of the patches drawn: systematic by chance*", *["-"] * 4, chance, "-"])
     rows.append(own_noise(results))
     results.table(
         "corrections",
