@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "nec_pass.hpp"
+#include "pass_rows.hpp"
 
 namespace xcalib {
 namespace {
@@ -121,6 +122,9 @@ NecFrame make_nec_frame(const Image& reference, const Image& source, const Image
         if (depth.pixels[i] <= 0) x = y = 0.0f;
         frame.reference_energy += squared(x, y);
     }
+    // The last row is read beyond its end.
+    frame.reference.x.resize(frame.reference.x.size() + kRoom);
+    frame.reference.y.resize(frame.reference.y.size() + kRoom);
     return frame;
 }
 

@@ -50,7 +50,7 @@ struct Pass {
 // The stencil of one row of pixels: its own row, its neighbours, and the reference's edges there.
 struct Stencil {
     const WarpedRow *above, *here, *below;
-    const float *reference_x, *reference_y;  // with room past the end
+    const float *reference_x, *reference_y;  // may be read past the end
     int width;
     float floor, cap;  // of the source's gradient
 };
@@ -223,7 +223,6 @@ void for_each_row(const NecFrame& frame, const Rig& rig, const Parameters& param
     Pass pass(frame, rig, parameters);
     const WarpedRow empty(width, parameters.size());
     std::array<WarpedRow, 3> rows{empty, empty, empty};
-    std::vector<float> reference_x(width + kRoom), reference_y(width + kRoom);
     const auto warp = [&](int y) {
         clock.warp([&] { HWY_DYNAMIC_DISPATCH(warp_row)(pass, y, rows[y % 3]); });
         if (parameters.size() > 0) HWY_DYNAMIC_DISPATCH(derive_row)(pass, y, rows[y % 3]);
@@ -233,11 +232,9 @@ void for_each_row(const NecFrame& frame, const Rig& rig, const Parameters& param
     for (int y = 1; y + 1 < height; ++y) {
         warp(y + 1);
         const std::size_t offset = static_cast<std::size_t>(y) * width;
-        std::copy_n(frame.reference.x.data() + offset, width, reference_x.data());
-        std::copy_n(frame.reference.y.data() + offset, width, reference_y.data());
-        work(Stencil{&rows[(y - 1) % 3], &rows[y % 3], &rows[(y + 1) % 3], reference_x.data(),
-                     reference_y.data(), width, frame.floor * frame.source_mean,
-                     kEdgeCap * frame.source_mean});
+        work(Stencil{&rows[(y - 1) % 3], &rows[y % 3], &rows[(y + 1) % 3],
+                     frame.reference.x.data() + offset, frame.reference.y.data() + offset, width,
+                     frame.floor * frame.source_mean, kEdgeCap * frame.source_mean});
     }
 }
 

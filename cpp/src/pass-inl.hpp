@@ -155,29 +155,31 @@ void derivative_row(const ProjectionDerivative& derivative, const Parameters& pa
         });
 }
 
-// sums += the products of the columns of one component. Lower triangle, by blocks of two by four.
-void add_products(const std::vector<float>& values, PassTile& tile) {
+// sums += the products of the columns. Lower triangle, by blocks of two by four.
+void add_products(PassTile& tile) {
     const FloatTag d;
     const int used = tile.count + 2, n = lanes();
     for (int i = 0; i < used; i += 2)
         for (int j = 0; j <= i + 1; j += 4) {
-            const float* r = values.data() + i * tile.capacity;
-            const float* c = values.data() + j * tile.capacity;
             const int step = tile.capacity;
             Float s00 = hn::Zero(d), s01 = s00, s02 = s00, s03 = s00;
             Float s10 = s00, s11 = s00, s12 = s00, s13 = s00;
-            for (int k = 0; k < tile.filled; k += n) {
-                const Float r0 = load(r + k), r1 = load(r + step + k);
-                const Float c0 = load(c + k), c1 = load(c + step + k);
-                const Float c2 = load(c + 2 * step + k), c3 = load(c + 3 * step + k);
-                s00 = hn::MulAdd(r0, c0, s00);
-                s01 = hn::MulAdd(r0, c1, s01);
-                s02 = hn::MulAdd(r0, c2, s02);
-                s03 = hn::MulAdd(r0, c3, s03);
-                s10 = hn::MulAdd(r1, c0, s10);
-                s11 = hn::MulAdd(r1, c1, s11);
-                s12 = hn::MulAdd(r1, c2, s12);
-                s13 = hn::MulAdd(r1, c3, s13);
+            for (const float* values : {tile.x.data(), tile.y.data()}) {
+                const float* r = values + i * step;
+                const float* c = values + j * step;
+                for (int k = 0; k < tile.filled; k += n) {
+                    const Float r0 = load(r + k), r1 = load(r + step + k);
+                    const Float c0 = load(c + k), c1 = load(c + step + k);
+                    const Float c2 = load(c + 2 * step + k), c3 = load(c + 3 * step + k);
+                    s00 = hn::MulAdd(r0, c0, s00);
+                    s01 = hn::MulAdd(r0, c1, s01);
+                    s02 = hn::MulAdd(r0, c2, s02);
+                    s03 = hn::MulAdd(r0, c3, s03);
+                    s10 = hn::MulAdd(r1, c0, s10);
+                    s11 = hn::MulAdd(r1, c1, s11);
+                    s12 = hn::MulAdd(r1, c2, s12);
+                    s13 = hn::MulAdd(r1, c3, s13);
+                }
             }
             double* out = tile.sums.data() + i * tile.columns + j;
             out[0] += total(s00), out[1] += total(s01), out[2] += total(s02), out[3] += total(s03);
@@ -200,8 +202,7 @@ void flush(PassTile& tile) {
                 (*tile.pixels)(c, first + 2 * i + 1) = tile.y[c * tile.capacity + i];
             }
     }
-    add_products(tile.x, tile);
-    add_products(tile.y, tile);
+    add_products(tile);
     tile.filled = 0;
 }
 
