@@ -46,7 +46,9 @@ void search_and_refine(const WorkingImages& images, const ImageView& reference,
     report.levels = found.levels;
     result.rig = found.rig;
 
-    // All frames, from the first level at which everything is free.
+    // All frames, from the first level at which everything is free and the start was not yet found
+    // on some of them; with flow from the first, since it reaches further the coarser they are.
+    const int from = options.flow == FlowMode::on ? kFactors[0] : found.levels.back().factor;
     double share_limit = 0;
     // The middle levels decide; what the coarse one leaves they find, and at the finest a step
     // costs most.
@@ -54,7 +56,7 @@ void search_and_refine(const WorkingImages& images, const ImageView& reference,
     const std::vector<Step> steps =
         schedule(report.working_width, report.working_height, options.parts);
     for (std::size_t s = 0; s < steps.size(); ++s) {
-        if (steps[s].stage == 1) continue;
+        if (steps[s].stage == 1 || steps[s].factor > from) continue;
         const Level level = make_level(images, steps[s].factor, result.rig, options.num_threads);
         if (share_limit == 0)
             share_limit = 0.8 * pooled(level, result.rig, options.num_threads).valid_share;

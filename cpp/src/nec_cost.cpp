@@ -5,6 +5,15 @@
 
 namespace xcalib {
 
+ceres::CallbackReturnType Curvature::operator()(const ceres::IterationSummary& step) {
+    if (step.iteration > 0 && step.step_is_successful) {
+        const double judged = used_;
+        used_ = next_;
+        next_ = std::clamp(judged * std::max(0.5, 2 - step.relative_decrease), 0.1, 1.0);
+    }
+    return ceres::SOLVER_CONTINUE;
+}
+
 double NecCost::cost_of(const NecValue& value) const {
     constexpr double kChargeForOverlap = 10.0;
     const double missing = std::max(0.0, minimum_share_ - value.valid_share);
@@ -21,8 +30,8 @@ CompressedBlock NecCost::linearized(const Rig& rig, const Parameters& free) cons
     const double cost = cost_of(equations.value);
     CompressedBlock block = compress(weight_ * equations.hessian, weight_ * equations.gradient, 0);
     const double explained = block.residuals.squaredNorm();  // g^T H^+ g
-    const double amplitude =
-        std::max(0.5 * std::max(equations.value.aligned, 0.1), explained / (2 * cost));
+    const double amplitude = std::max(
+        0.5 * std::max(equations.value.aligned, 0.1) * curvature_.share(), explained / (2 * cost));
     block.jacobian *= std::sqrt(amplitude);
     block.residuals /= std::sqrt(amplitude);
     block.residuals[free.size()] = std::sqrt(std::max(0.0, 2 * cost - explained / amplitude));
