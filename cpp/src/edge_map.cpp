@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gradient_rows.hpp"
 #include "mat.hpp"
 #include "xcalib/gray.hpp"
 
@@ -26,12 +27,12 @@ cv::Mat as_mat(const EdgeMap& map) {
 
 EdgeMap edge_map(const Image& image, float floor) {
     const Image smooth = gaussian_blur(image, kBlur);
-    const EdgeField field = edge_field(smooth, mean_gradient(smooth, nullptr), floor);
+    const EdgeField field = edge_field(smooth, mean_gradient(smooth), floor);
     EdgeMap full = sized(image.width, image.height);
-    for (std::size_t i = 0; i < full.z.size(); ++i) {
-        const float x = field.x[i], y = field.y[i];
-        const float a = std::sqrt(x * x + y * y);
-        if (a > 0) full.z[i] = {(x * x - y * y) / a, 2 * x * y / a};
+    for (int y = 0; y < image.height; ++y) {
+        const std::size_t offset = static_cast<std::size_t>(y) * image.width;
+        doubled_angles(field.x.data() + offset, field.y.data() + offset, image.width,
+                       full.z.data() + offset);
     }
     int halvings = 0;
     while (image.width >> halvings > kEdgeMapWidth) ++halvings;

@@ -39,9 +39,9 @@ struct EdgePass {
     EdgePass(const EdgeMap& reference, const EdgeMap& source, const Image& depth, const Rig& rig,
              const Parameters& parameters)
         : reference(reference), source(source), depth(depth), camera(rig.reference),
-          reprojection(rig), derivative(rig), parameters(parameters), points(depth.width),
-          u(depth.width + kRoom, NAN), v(depth.width + kRoom, NAN),
-          real(depth.width + kRoom, parameters.size()),
+          reprojection(rig), derivative(rig), parameters(parameters),
+          points(parameters.size() > 0 ? depth.width : 0), u(depth.width + kRoom, NAN),
+          v(depth.width + kRoom, NAN), real(depth.width + kRoom, parameters.size()),
           imaginary(depth.width + kRoom, parameters.size()), validity(depth.width) {
         const Eigen::Matrix3d R = rig.R();
         const double roll = std::atan2(R(1, 0), R(0, 0));
@@ -197,7 +197,8 @@ EdgePair::EdgePair(EdgeMap reference, EdgeMap source, Image depth)
         if (depth_.pixels[i] <= 0) reference_.z[i] = 0;
         reference_energy_ += std::norm(reference_.z[i]);
     }
-    reference_.z.resize(reference_.z.size() + kRoom);  // the last row is read beyond its end
+    reference_.z.reserve(reference_.z.size() + kRoom);  // exactly: to grow would double it
+    reference_.z.resize(reference_.z.size() + kRoom);   // the last row is read beyond its end
 }
 
 NecValue EdgePair::evaluate(const Rig& rig) const {

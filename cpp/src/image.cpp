@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -21,13 +22,29 @@ float reduced_depth(const Image& depth, double x0, double x1, double y0, double 
     const int right = std::max(left + 1, static_cast<int>(std::floor(x1 + 0.5)));
     const int top = static_cast<int>(std::floor(y0 + 0.5));
     const int bottom = std::max(top + 1, static_cast<int>(std::floor(y1 + 0.5)));
+    const int end_x = std::min(right, depth.width), end_y = std::min(bottom, depth.height);
+    const int cells = (end_x - left) * (end_y - top);
+    float nearest = std::numeric_limits<float>::max(), farthest = 0.0f;
+    double sum = 0;  // of the known pixels' inverse depths
+    int known_cells = 0;
+    for (int y = top; y < end_y; ++y) {
+        const float* row = depth.row(y);
+        for (int x = left; x < end_x; ++x) {
+            const bool is_known = row[x] > 0;
+            nearest = std::min(nearest, is_known ? row[x] : nearest);
+            farthest = std::max(farthest, row[x]);
+            sum += is_known ? 1.0 / row[x] : 0.0;
+            known_cells += is_known;
+        }
+    }
+    if (known_cells == 0 || 2 * known_cells < cells) return 0.0f;
+    // Nearly everywhere they are of one surface, whichever of them is the median.
+    if (farthest < nearest * kSameSurface) return static_cast<float>(known_cells / sum);
     values.clear();
-    int cells = 0;
-    for (int y = top; y < std::min(bottom, depth.height); ++y)
-        for (int x = left; x < std::min(right, depth.width); ++x, ++cells)
+    for (int y = top; y < end_y; ++y)
+        for (int x = left; x < end_x; ++x)
             if (const float d = depth.row(y)[x]; d > 0) values.push_back(d);
     const std::size_t count = values.size();
-    if (count == 0 || 2 * count < static_cast<std::size_t>(cells)) return 0.0f;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
     std::nth_element(values.begin(), middle, values.end());
     const float median = *middle;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "gradient_rows.hpp"
 #include "nec_pass.hpp"
 #include "pass_rows.hpp"
 
@@ -12,6 +13,10 @@ namespace {
 
 // Floats in, double sums.
 inline double squared(double x, double y) { return x * x + y * y; }
+
+ImageRows rows_at(const Image& image, int y) {
+    return {image.row(y - 1), image.row(y), image.row(y + 1), image.width};
+}
 
 }  // namespace
 
@@ -69,53 +74,33 @@ double nec(const Image& reference, const Image& registered, const std::uint8_t* 
 EdgeField edge_field(const Image& image, float mean_magnitude, float relative_floor) {
     const float floor = relative_floor * mean_magnitude, cap = kEdgeCap * mean_magnitude;
     EdgeField field{image.width, image.height, {}, {}};
-    field.x.assign(image.pixels.size(), 0.0f);
-    field.y.assign(image.pixels.size(), 0.0f);
+    for (std::vector<float>* part : {&field.x, &field.y}) {
+        part->reserve(image.pixels.size() + kRoom);  // for those who read beyond the end
+        part->assign(image.pixels.size(), 0.0f);
+    }
     for (int y = 1; y + 1 < image.height; ++y) {
-        const float* here = image.row(y);
-        const float *above = image.row(y - 1), *below = image.row(y + 1);
-        float* out_x = field.x.data() + static_cast<std::size_t>(y) * image.width;
-        float* out_y = field.y.data() + static_cast<std::size_t>(y) * image.width;
-#pragma GCC ivdep
-        for (int x = 1; x < image.width - 1; ++x) {
-            const float gx = 0.5f * (here[x + 1] - here[x - 1]);
-            const float gy = 0.5f * (below[x] - above[x]);
-            const float g = std::sqrt(gx * gx + gy * gy);
-            const float rise = std::max(std::min(g, cap) - floor, 0.0f);
-            const float scale = rise / (g > 0 ? g : 1.0f);
-            out_x[x] = gx * scale;
-            out_y[x] = gy * scale;
-        }
+        const std::size_t offset = static_cast<std::size_t>(y) * image.width;
+        clamped_gradients(rows_at(image, y), floor, cap, field.x.data() + offset,
+                          field.y.data() + offset);
     }
     return field;
 }
 
-float mean_gradient(const Image& image, const std::uint8_t* validity) {
+float mean_gradient(const Image& image) {
+    if (image.width < 3 || image.height < 3) return 0.0f;
     double sum = 0;
-    std::size_t count = 0;
-    for (int y = 1; y + 1 < image.height; ++y)
-        for (int x = 1; x + 1 < image.width; ++x) {
-            const std::size_t i = static_cast<std::size_t>(y) * image.width + x;
-            if (validity && (validity[i - image.width] | validity[i - 1] | validity[i] |
-                             validity[i + 1] | validity[i + image.width]))
-                continue;
-            const float* p = image.pixels.data() + i;
-            const float gx = p[1] - p[-1], gy = p[image.width] - p[-image.width];
-            sum += 0.5f * std::sqrt(gx * gx + gy * gy);
-            ++count;
-        }
-    return count > 0 ? static_cast<float>(sum / static_cast<double>(count)) : 0.0f;
+    for (int y = 1; y + 1 < image.height; ++y) sum += sum_of_gradients(rows_at(image, y));
+    return static_cast<float>(sum / (image.width - 2) / (image.height - 2));
 }
 
 NecFrame make_nec_frame(const Image& reference, const Image& source, const Image& depth,
                         const Rig& rig, float floor) {
     NecFrame frame;
     frame.floor = floor;
-    frame.reference = edge_field(reference, mean_gradient(reference, nullptr), floor);
+    frame.reference = edge_field(reference, mean_gradient(reference), floor);
     frame.depth = depth;
     frame.source = source;
-    const WarpedImage warped = warp(rig, source, depth);
-    frame.source_mean = mean_gradient(warped.image, warped.validity.data());
+    frame.source_mean = warped_mean_gradient(frame, rig);
     for (std::size_t i = 0; i < depth.pixels.size(); ++i) {
         float& x = frame.reference.x[i];
         float& y = frame.reference.y[i];

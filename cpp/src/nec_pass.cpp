@@ -42,9 +42,10 @@ struct Pass {
 
     Pass(const NecFrame& frame, const Rig& rig, const Parameters& parameters)
         : frame(frame), reference(rig.reference), reprojection(rig), derivative(rig),
-          parameters(parameters), points(frame.depth.width), u(frame.depth.width + kRoom, NAN),
-          v(frame.depth.width + kRoom, NAN), du(frame.depth.width + kRoom),
-          dv(frame.depth.width + kRoom), validity(frame.depth.width) {}
+          parameters(parameters), points(parameters.size() > 0 ? frame.depth.width : 0),
+          u(frame.depth.width + kRoom, NAN), v(frame.depth.width + kRoom, NAN),
+          du(frame.depth.width + kRoom), dv(frame.depth.width + kRoom),
+          validity(frame.depth.width) {}
 };
 
 // The stencil of one row of pixels: its own row, its neighbours, and the reference's edges there.
@@ -53,6 +54,10 @@ struct Stencil {
     const float *reference_x, *reference_y;  // may be read past the end
     int width;
     float floor, cap;  // of the source's gradient
+};
+
+struct MeanSums {
+    double magnitudes, count;
 };
 
 }  // namespace
@@ -155,6 +160,17 @@ NecSums sum_row(const Stencil& s) {
     return {total(aa), total(vv), total(av), total(magnitudes)};
 }
 
+MeanSums sum_magnitudes(const Stencil& s) {
+    const FloatTag d;
+    Float magnitudes = hn::Zero(d), count = magnitudes;
+    for (int x = 1; x < s.width - 1; x += lanes()) {
+        const Gradient g = gradient_at(s, x);
+        magnitudes = hn::Add(magnitudes, hn::IfThenElseZero(g.valid, g.magnitude));
+        count = hn::Add(count, hn::IfThenElseZero(g.valid, hn::Set(d, 1.0f)));
+    }
+    return {total(magnitudes), total(count)};
+}
+
 // Appends the row's edge pixels to the tile. Of the sums it gives aa and magnitudes.
 NecSums append_row(const Stencil& s, PassTile& tile) {
     const FloatTag d;
@@ -210,6 +226,7 @@ namespace {
 HWY_EXPORT(warp_row);
 HWY_EXPORT(derive_row);
 HWY_EXPORT(sum_row);
+HWY_EXPORT(sum_magnitudes);
 HWY_EXPORT(append_row);
 HWY_EXPORT(flush_tile);
 
@@ -250,6 +267,16 @@ NecSums nec_sums(const NecFrame& frame, const Rig& rig, WorkTimes* times) {
         sums.magnitudes += row.magnitudes;
     });
     return sums;
+}
+
+float warped_mean_gradient(const NecFrame& frame, const Rig& rig) {
+    double sum = 0, count = 0;
+    for_each_row(frame, rig, Parameters(0), nullptr, [&](const Stencil& stencil) {
+        const MeanSums row = HWY_DYNAMIC_DISPATCH(sum_magnitudes)(stencil);
+        sum += row.magnitudes;
+        count += row.count;
+    });
+    return count > 0 ? static_cast<float>(sum / count) : 0.0f;
 }
 
 NecGram nec_gram(const NecFrame& frame, const Rig& rig, const Parameters& parameters,

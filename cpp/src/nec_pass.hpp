@@ -20,6 +20,9 @@ struct NecSums {
 // `times`, if any, receives what it took.
 NecSums nec_sums(const NecFrame& frame, const Rig& rig, WorkTimes* times = nullptr);
 
+// Mean gradient magnitude of the warped source, where the whole stencil is valid.
+float warped_mean_gradient(const NecFrame& frame, const Rig& rig);
+
 // Rows of [dv/dp ..., v, s a n_R], two (x and y) for each pixel where the source has an edge; s is
 // the polarity.
 struct NecGram {

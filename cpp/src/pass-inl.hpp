@@ -9,27 +9,13 @@
 #define XCALIB_PASS_INL_HPP
 #endif
 
-#include <hwy/highway.h>
-
 #include "pass_rows.hpp"
+#include "vectors-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
-using FloatTag = hn::ScalableTag<float>;
-using IntTag = hn::RebindToSigned<FloatTag>;
-using Float = hn::Vec<FloatTag>;
-using Int = hn::Vec<IntTag>;
-using Mask = hn::Mask<FloatTag>;
-
-HWY_INLINE int lanes() { return static_cast<int>(hn::Lanes(FloatTag())); }
-HWY_INLINE Float load(const float* from) { return hn::LoadU(FloatTag(), from); }
-HWY_INLINE double total(Float sum) {
-    return static_cast<double>(hn::GetLane(hn::SumOfLanes(FloatTag(), sum)));
-}
 
 // Four neighbours of a point in the source, of which each vector holds one, and what of the point
 // lies beyond the first.

@@ -76,8 +76,11 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
 }
 
 // What candidates are compared by: how well edges agree beyond chance, and over how much of the
-// image. Chance grows as the overlap shrinks.
-double merit(const NecValue& value) { return value.aligned * std::sqrt(value.valid_share); }
+// image. Chance grows as the overlap shrinks. Of a NecValue or a LevelReport.
+template <class Value>
+double merit(const Value& value) {
+    return value.aligned * std::sqrt(value.valid_share);
+}
 
 // Where the field of view of the reference makes little difference, it is the paper's 45 deg.
 double preference(const Rig& rig) {
@@ -338,7 +341,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
                                   quick, candidate.rig, candidate.rig)
                     : solve_stage(images, level, steps[s].stage, candidate.share_limit, kTolerance,
                                   quick, flow, candidate.rig));
-            candidate.merit = merit(pooled(level, candidate.rig, num_threads));
+            candidate.merit = merit(candidate.levels.back());
             out.candidates[candidate.entry].refined = candidate.rig;
             out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;
         }

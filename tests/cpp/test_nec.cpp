@@ -76,16 +76,29 @@ TEST(EdgeField, KeepsTheDirection) {
     EXPECT_NEAR(field.y[12], 4 * 0.7, 1e-5);
 }
 
-TEST(MeanGradient, IsOverPixelsWhoseStencilIsValid) {
-    // g = 1 on the left, 3 on the right.
+TEST(MeanGradient, LeavesTheRimOut) {
+    // g = 1 on the left, 3 on the right; wide enough for whole vectors and a rest.
+    for (int width : {11, 41}) {
+        const int bend = width / 2;
+        const Image image =
+            drawn([&](double x, double) { return x < bend ? x : bend + 3 * (x - bend); }, width, 3);
+        const int inner = bend - 1;  // on both sides, and one of 2 at the bend
+        EXPECT_NEAR(mean_gradient(image), (inner * 1 + 2 + inner * 3) / double(width - 2), 1e-5);
+    }
+    EXPECT_EQ(mean_gradient(Image(2, 9, 1.0f)), 0);
+}
+
+TEST(MeanGradient, OfTheWarpedSourceIsOverPixelsWhoseStencilIsValid) {
+    // As before; the rig maps each pixel onto itself.
     const Image image = drawn([](double x, double) { return x < 5 ? x : 5 + 3 * (x - 5); }, 11, 3);
-    // Columns 1..9 of row 1: four of 1, one of 2 at the bend, four of 3.
-    EXPECT_NEAR(mean_gradient(image, nullptr), (4 * 1 + 2 + 4 * 3) / 9.0, 1e-5);
-    std::vector<std::uint8_t> validity(33, 0);
-    validity[11 + 7] = 1;  // takes itself and its neighbours in the row out
-    EXPECT_NEAR(mean_gradient(image, validity.data()), (4 * 1 + 2 + 3) / 6.0, 1e-5);
-    std::fill(validity.begin(), validity.end(), 3);
-    EXPECT_EQ(mean_gradient(image, validity.data()), 0);
+    Rig rig;
+    rig.reference = rig.source = Pinhole::from_hfov(11, 3, 0.7);
+    Image depth(11, 3, 5.0f);
+    EXPECT_NEAR(make_nec_frame(image, image, depth, rig).source_mean, (4 * 1 + 2 + 4 * 3) / 9.0,
+                1e-4);
+    depth.row(1)[7] = 0;  // takes itself and its neighbours in the row out
+    EXPECT_NEAR(make_nec_frame(image, image, depth, rig).source_mean, (4 * 1 + 2 + 3) / 6.0, 1e-4);
+    EXPECT_EQ(make_nec_frame(image, image, Image(11, 3), rig).source_mean, 0);
 }
 
 // --- The objective

@@ -41,8 +41,8 @@ struct EdgeField {
 };
 EdgeField edge_field(const Image& image, float mean_magnitude, float floor = kEdgeFloor);
 
-// Mean gradient magnitude m where `validity` is 0 throughout the stencil (null: everywhere).
-float mean_gradient(const Image& image, const std::uint8_t* validity);
+// Mean gradient magnitude m.
+float mean_gradient(const Image& image);
 
 // One pair of the objective at one pyramid level. Everything is held but the rig.
 struct NecFrame {
