@@ -46,8 +46,8 @@ void search_and_refine(const WorkingImages& images, const ImageView& reference,
     report.levels = found.levels;
     result.rig = found.rig;
 
-    // All frames, from the first level at which everything is free and the start was not yet found
-    // on some of them; with flow from the first, since it reaches further the coarser they are.
+    // All frames, from the level at which the start was found on some of them; with flow from the
+    // first at which everything is free, since flow reaches further the coarser the level is.
     const int from = options.flow == FlowMode::on ? kFactors[0] : found.levels.back().factor;
     double share_limit = 0;
     // The middle levels decide; what the coarse one leaves they find, and at the finest a step

@@ -1,6 +1,7 @@
 // A pair of images at one level, as the solver sees it: something that is compared through a rig.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 
 #include "nec_pass.hpp"
@@ -19,6 +20,9 @@ class ImagePair {
     virtual NecNormalEquations normal_equations(const Rig& rig,
                                                 const Parameters& parameters) const = 0;
     virtual const Image& depth() const = 0;  // on the reference's grid [m]
+    // The share of the normal equations' curvature that the cost has: only edges with a partner
+    // bend it. As it was measured, by what steps lowered the cost by and what they were to.
+    virtual double curvature(const NecValue& at) const = 0;
 
     std::shared_ptr<WorkTimes> times;  // receives, if any, what the above take
 };
@@ -36,6 +40,10 @@ class NecPair : public ImagePair {
         return equations_from_gram(pass.gram, value_of(frame_, pass.sums));
     }
     const Image& depth() const override { return frame_.depth; }
+    double curvature(const NecValue& at) const override {
+        const double aligned = std::max(0.0, at.aligned);
+        return 0.8 * aligned * aligned;
+    }
 
    private:
     NecFrame frame_;
@@ -50,6 +58,7 @@ class EdgePair : public ImagePair {
     NecNormalEquations normal_equations(const Rig& rig,
                                         const Parameters& parameters) const override;
     const Image& depth() const override { return depth_; }
+    double curvature(const NecValue& at) const override { return at.aligned; }
 
    private:
     EdgeMap reference_, source_;

@@ -135,11 +135,10 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
     const Parameters free = free_parameters(stage, options);
-    Curvature curvature;
     for (std::size_t i = 0; i < level.pairs.size() && options.parts.images; ++i)
         problem.AddResidualBlock(
-            new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free, curvature),
-            nullptr, blocks);
+            new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free), nullptr,
+            blocks);
     for (const FlowTargets& targets : flow)
         problem.AddResidualBlock(new FlowCost(targets, options.flow_weight, free), nullptr, blocks);
     if (stage == 1 && options.prior_weight > 0) {
@@ -162,7 +161,6 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     solver.function_tolerance = tolerance;
     solver.parameter_tolerance = 1e-7;
     solver.logging_type = ceres::SILENT;
-    solver.callbacks.push_back(&curvature);
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem, &summary);
     const double own = summary.total_time_in_seconds - summary.residual_evaluation_time_in_seconds -

@@ -132,14 +132,14 @@ Scene smooth_scene(unsigned seed, double off, int width = 300, int height = 225)
 struct OnePair {
     SolverParameters parameters;
     ceres::Problem problem;
-    Curvature curvature;
+
     NecPair pair;
 
     OnePair(const NecFrame& frame, const Rig& rig, double weight, bool with_reference)
         : parameters(solver_from_rig(rig)), pair(frame) {
         problem.AddResidualBlock(
             new NecCost(pair, rig, weight, 0.0,
-                        with_reference ? kNumParameters : kNumWithoutReference, curvature),
+                        with_reference ? kNumParameters : kNumWithoutReference),
             nullptr, NecCost::blocks(parameters));
         problem.SetManifold(parameters.quaternion, new ceres::QuaternionManifold);
     }
