@@ -42,7 +42,7 @@ class NecPair : public ImagePair {
     const Image& depth() const override { return frame_.depth; }
     double curvature(const NecValue& at) const override {
         const double aligned = std::max(0.0, at.aligned);
-        return 0.8 * aligned * aligned;
+        return std::min(0.5, 0.8 * aligned) * aligned;
     }
 
    private:
