@@ -176,6 +176,7 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
             "options: search.mode = local, expected an initial rig with it");
     }
 
+    const WorkersOfThread workers(resolve_threads(options.num_threads));
     CalibrationResult result;
     CalibrationReport& report = result.report;
     report.frames =

@@ -6,9 +6,10 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
-#include <system_error>
 #include <thread>
 #include <vector>
+
+#include "workers.hpp"
 
 namespace xcalib {
 
@@ -35,16 +36,8 @@ void parallel_ranges(int count, int num_threads, const Work& work) {
             errors[part] = std::current_exception();
         }
     };
-    std::vector<std::thread> threads;
-    int started = 1;
-    try {
-        for (; started < parts; ++started) threads.emplace_back(guarded, started);
-    } catch (const std::system_error&) {
-        // No more threads to be had: their parts are done here.
-    }
-    guarded(0);
-    for (int part = started; part < parts; ++part) guarded(part);
-    for (std::thread& thread : threads) thread.join();
+    if (Workers* workers = WorkersOfThread::here()) workers->each(parts, guarded);
+    else Workers(parts).each(parts, guarded);
     for (const std::exception_ptr& error : errors)
         if (error) std::rethrow_exception(error);
 }

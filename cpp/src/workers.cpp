@@ -12,7 +12,7 @@
 namespace xcalib {
 
 struct Workers::Crew {
-    std::mutex busy;  // held by the one call that has the threads
+    std::atomic<bool> busy{false};  // by the one call that has the threads
     std::mutex mutex;
     std::condition_variable posted, left;
     const Job* job = nullptr;  // open to threads that come
@@ -60,8 +60,7 @@ void Workers::run(const Job& job) {
         for (int part = 0; part < job.count; ++part) job.call(job.work, part);
     };
     if (job.count <= 1 || getpid() != process_ || crew_->threads.empty()) return alone();
-    const std::unique_lock busy(crew_->busy, std::try_to_lock);
-    if (!busy) return alone();
+    if (crew_->busy.exchange(true, std::memory_order_acquire)) return alone();
     {
         const std::lock_guard lock(crew_->mutex);
         crew_->job = &job;
@@ -74,6 +73,7 @@ void Workers::run(const Job& job) {
     std::unique_lock lock(crew_->mutex);
     crew_->job = nullptr;
     crew_->left.wait(lock, [this] { return crew_->inside == 0; });
+    crew_->busy.store(false, std::memory_order_release);
 }
 
 void Workers::Crew::wait_for_jobs() {

@@ -1,4 +1,5 @@
-// Threads that wait between frames: starting one takes as long as a good part of a frame does.
+// Threads that wait between one piece of work and the next: starting one takes as long as a good
+// part of a frame does.
 #pragma once
 
 #include <sys/types.h>
@@ -37,6 +38,24 @@ class Workers {
 
     pid_t process_;  // that has the threads
     std::unique_ptr<Crew> crew_;
+};
+
+// As long as it lives, what its thread does in parallel (parallel.hpp) is shared out among these.
+class WorkersOfThread {
+   public:
+    explicit WorkersOfThread(int num_threads) : workers_(num_threads), before_(here_) {
+        here_ = &workers_;
+    }
+    ~WorkersOfThread() { here_ = before_; }
+    WorkersOfThread(const WorkersOfThread&) = delete;
+    WorkersOfThread& operator=(const WorkersOfThread&) = delete;
+
+    static Workers* here() { return here_; }  // or null
+
+   private:
+    Workers workers_;
+    Workers* before_;
+    static inline thread_local Workers* here_ = nullptr;
 };
 
 }  // namespace xcalib

@@ -6,9 +6,12 @@
 #include <atomic>
 #include <csignal>
 #include <cstdlib>
+#include <mutex>
+#include <set>
 #include <thread>
 #include <vector>
 
+#include "parallel.hpp"
 #include "workers.hpp"
 
 namespace xcalib {
@@ -60,6 +63,37 @@ TEST(Workers, AForkedProcessDoesItAloneAndEnds) {
                                           << ", of which " << SIGALRM << " is the alarm";
         ASSERT_EQ(WEXITSTATUS(status), 0);
     }
+}
+
+// Within a part all is done by the thread that has it, and the caller's before are there again
+// after.
+TEST(Workers, OfAThreadAreSharedByWhatItDoesInParallel) {
+    EXPECT_EQ(WorkersOfThread::here(), nullptr);
+    const WorkersOfThread outer(3);
+    Workers* const before = WorkersOfThread::here();
+    {
+        const WorkersOfThread inner(2);
+        EXPECT_NE(WorkersOfThread::here(), before);
+    }
+    EXPECT_EQ(WorkersOfThread::here(), before);
+    std::atomic<int> calls{0};
+    std::mutex mutex;
+    std::set<std::thread::id> threads;
+    for (int i = 0; i < 50; ++i)
+        parallel_each(20, 3, [&](int) {
+            parallel_each(5, 1, [&](int) { ++calls; });
+            const std::lock_guard lock(mutex);
+            threads.insert(std::this_thread::get_id());
+        });
+    EXPECT_EQ(calls, 50 * 20 * 5);
+    EXPECT_LE(threads.size(), 3u);
+    EXPECT_THROW(parallel_each(9, 3,
+                               [](int i) {
+                                   if (i > 3) throw i;
+                               }),
+                 int);
+    parallel_each(9, 3, [&](int) { parallel_each(4, 3, [&](int) { ++calls; }); });
+    EXPECT_EQ(calls, 50 * 20 * 5 + 36);
 }
 
 TEST(Workers, AreAsManyAsTheSystemGives) {
