@@ -75,7 +75,7 @@ HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& dep
         const int x = begin + i * kLanes;
         const Float depth = depths.load(x);
         depths.prefetch_next_row(x);
-        __builtin_prefetch(out + i * vector_bytes, 1);
+        __builtin_prefetch(out + (i + kVectors) * vector_bytes, 1);  // a stretch ahead
         const Located at = locate(row, depth, along);
         // Elsewhere it is far outside.
         const Float left = hn::IfThenElseZero(hn::Gt(depth, least), at.x);
