@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+from drive import write_drive
 from xcalib import Rig, synthetic
 from xcalib.cli import cli as python_command
 
@@ -52,6 +53,14 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def scene(rendered: Path, tmp_path: Path) -> Path:
     """A copy of `rendered` that a test may spoil."""
     return Path(shutil.copytree(rendered, tmp_path / "scene"))
+
+
+@pytest.fixture(scope="session")
+def drive(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drive of `rendered`'s frames, each with noise of its own. Read only."""
+    folder = tmp_path_factory.mktemp("drive")
+    write_drive(rendered, folder)
+    return folder
 
 
 @pytest.fixture(scope="session")

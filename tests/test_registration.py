@@ -23,6 +23,7 @@ import pytest
 from click.testing import Result
 
 from conftest import FRAMES, run
+from drive import COPIES, arguments, contents, files_below
 from xcalib import Rig, registration
 from xcalib.depth import FolderDepth, NetworkDepth
 from xcalib.footage import Stream, open_stream
@@ -32,7 +33,6 @@ from xcalib.pipeline import Frames
 from xcalib.registration import run_registration
 
 Refused = Callable[..., str]
-COPIES = 20
 PART = 16
 STOPS = 3
 COMMAND = f"""
@@ -41,27 +41,6 @@ VideoSink.PART = {PART}
 from xcalib.cli import main
 main()
 """
-
-
-@pytest.fixture(scope="module")
-def drive(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The rendered frames over and over, each with noise of its own. Read only."""
-    folder = tmp_path_factory.mktemp("drive")
-    rng = np.random.default_rng(0)
-    for kind in ("visible", "thermal", "depth"):
-        for index, path in enumerate(list_files(rendered / kind)):
-            image = read_image(path)
-            for copy in range(COPIES):
-                if kind == "thermal":
-                    image = image // 2 + rng.integers(0, 120, image.shape, np.uint8)
-                write_image(folder / kind / f"{copy * FRAMES + index:04d}.png", image)
-    shutil.copy(rendered / "rig.yaml", folder)
-    return folder
-
-
-def arguments(folder: Path, out: Path, *more: str | Path) -> tuple[str, ...]:
-    given = ("register", folder / "rig.yaml", folder / "visible", folder / "thermal")
-    return tuple(map(str, (*given, "--depth", folder / "depth", "-o", out, *more)))
 
 
 def register(folder: Path, out: Path, *more: str | Path) -> Result:
@@ -76,16 +55,6 @@ def process(*given: str) -> subprocess.Popen[str]:
 def threads() -> list[threading.Thread]:
     """All but tqdm's watchdog."""
     return [thread for thread in threading.enumerate() if not thread.daemon]
-
-
-def files_below(out: Path) -> dict[str, Path]:
-    return {str(path.relative_to(out)): path for path in out.rglob("*") if path.is_file()}
-
-
-def contents(out: Path) -> dict[str, bytes]:
-    """All that was written, but the journals, whose lines come as threads end."""
-    found = files_below(out)
-    return {name: p.read_bytes() for name, p in found.items() if not name.endswith(".jsonl")}
 
 
 def same_frames(first: Path, second: Path, tolerance: float = 0) -> None:

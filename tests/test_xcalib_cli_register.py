@@ -22,45 +22,14 @@ import pytest
 from click.testing import Result
 
 from conftest import FRAMES, Process, run
+from drive import COPIES, arguments, contents, files_below
 from test_footage import IDENTITY, THERMAL, VISIBLE, Pan
 from xcalib.footage import open_stream
 from xcalib.footage.encoder import encoder_name
 from xcalib.frames import Image, list_files, read_image, write_image
 
-COPIES = 20
 TOTAL = FRAMES * COPIES
 Both = Callable[..., tuple[Process, Result]]
-
-
-@pytest.fixture(scope="module")
-def drive(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The rendered frames over and over, each with noise of its own. Read only."""
-    folder = tmp_path_factory.mktemp("drive")
-    rng = np.random.default_rng(0)
-    for kind in ("visible", "thermal", "depth"):
-        for index, path in enumerate(list_files(rendered / kind)):
-            image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-            for copy in range(COPIES):
-                if kind == "thermal":
-                    image = image // 2 + rng.integers(0, 120, image.shape, np.uint8)
-                write_image(folder / kind / f"{copy * FRAMES + index:04d}.png", image)
-    shutil.copy(rendered / "rig.yaml", folder)
-    return folder
-
-
-def arguments(folder: Path, out: Path, *more: str | Path) -> tuple[str, ...]:
-    given = ("register", folder / "rig.yaml", folder / "visible", folder / "thermal")
-    return tuple(map(str, (*given, "--depth", folder / "depth", "-o", out, *more)))
-
-
-def files_below(out: Path) -> dict[str, Path]:
-    return {str(path.relative_to(out)): path for path in out.rglob("*") if path.is_file()}
-
-
-def contents(out: Path) -> dict[str, bytes]:
-    """All that was written, but the journals, whose lines come as threads end."""
-    found = files_below(out)
-    return {name: p.read_bytes() for name, p in found.items() if not name.endswith(".jsonl")}
 
 
 def pixels(out: Path) -> dict[str, Image]:

@@ -8,7 +8,6 @@
 #endif
 
 #include <hwy/cache_control.h>
-#include <hwy/highway.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +15,7 @@
 #include <limits>
 
 #include "register_rows.hpp"
+#include "vectors-inl.hpp"
 
 // x86 with eight lanes or more; of Highway's targets, the better has the lower number.
 #undef XCALIB_X86_LANES
@@ -30,14 +30,8 @@ namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using FloatTag = hn::ScalableTag<float>;
-using IntTag = hn::RebindToSigned<FloatTag>;
 using ByteTag = hn::Rebind<std::uint8_t, FloatTag>;
 using ShortTag = hn::Rebind<std::uint16_t, FloatTag>;
-using Float = hn::Vec<FloatTag>;
-using Int = hn::Vec<IntTag>;
-using Mask = hn::Mask<FloatTag>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(FloatTag()));
 
 HWY_INLINE Float set(double value) { return hn::Set(FloatTag(), static_cast<float>(value)); }

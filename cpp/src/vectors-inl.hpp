@@ -1,4 +1,4 @@
-// Vectors of floats, as the calibration's loops use them. Included once for each instruction set.
+// Vectors of floats, as all kernels use them. Included once for each instruction set.
 #if defined(XCALIB_VECTORS_INL_HPP) == defined(HWY_TARGET_TOGGLE)
 #ifdef XCALIB_VECTORS_INL_HPP
 #undef XCALIB_VECTORS_INL_HPP
