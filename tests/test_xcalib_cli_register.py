@@ -545,3 +545,37 @@ def test_both_say_that_too_few_frames_tell_no_offset(
     assert first.stderr == second.stderr
     assert "moves too little to tell a clock offset, 0 s is used" in first.stderr
     assert "too few frames overlap to confirm" in first.stderr
+
+
+def named(rendered: Path, folder: Path, names: tuple[str, str]) -> tuple[str, ...]:
+    """Arguments of two frames whose visible images have these names."""
+    for kind in ("visible", "thermal"):
+        for index, name in enumerate(names if kind == "visible" else ("1.png", "2.png")):
+            image = read_image(list_files(rendered / kind)[index])
+            (folder / kind).mkdir(parents=True, exist_ok=True)
+            assert cv2.imwrite(str(folder / kind / name), image)
+    inputs = (rendered / "rig.yaml", folder / "visible", folder / "thermal")
+    return tuple(map(str, ("register", *inputs, "--depth", "plane", "-o", folder / "out")))
+
+
+def test_two_dots_within_a_name_are_no_way_out(
+    rendered: Path, tmp_path: Path, cli: Callable[..., Process]
+) -> None:
+    command = named(rendered, tmp_path, ("cam..1.png", "cam..2.png"))
+    assert cli(*command).returncode == 0
+    again = cli(*command)
+    assert again.returncode == 0, again.stderr
+    assert "(2 from before)" in again.stdout + again.stderr
+    assert run(*command).exit_code == 0
+
+
+def test_a_live_run_that_does_not_start_leaves_what_was_there(
+    rendered: Path, tmp_path: Path, cli: Callable[..., Process]
+) -> None:
+    command = named(rendered, tmp_path, ("1.png", "2.png"))
+    assert cli(*command).returncode == 0
+    before = contents(tmp_path / "out")
+    live = ("register", rendered / "rig.yaml", tmp_path / "no", tmp_path / "camera", "--live")
+    out = ("--depth", "plane", "-o", tmp_path / "out", "--overwrite")
+    assert cli(*map(str, (*live, *out))).returncode != 0
+    assert contents(tmp_path / "out") == before

@@ -11,6 +11,7 @@ extern "C" {
 #include <cmath>
 #include <map>
 #include <string_view>
+#include <stdexcept>
 #include <system_error>
 
 #include "files.hpp"
@@ -188,9 +189,9 @@ void check_count(const Path& file, int frames, const Path& target) {
         }
     }
     if (found < frames)
-        throw InputError(target.string() + ": " + std::to_string(found) + " of " +
-                         std::to_string(frames) +
-                         " frames could be written; is there space on the disk?");
+        throw std::runtime_error(target.string() + ": " + std::to_string(found) + " of " +
+                                 std::to_string(frames) +
+                                 " frames could be written; is there space on the disk?");
 }
 
 void remove_quietly(const Path& file) {

@@ -31,7 +31,8 @@ Unit unit_of(const Json& line) {
         unit.frames.emplace_back(key, valid.get<long>());
     for (const auto& [name, size] : line.at("files").items()) {
         // What --overwrite removes is ours.
-        if (Path(name).is_absolute() || name.find("..") != std::string::npos)
+        const Path file(name);
+        if (file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end())
             throw std::invalid_argument(name);
         unit.files.emplace_back(name, size.get<std::uintmax_t>());
     }
@@ -85,7 +86,8 @@ void Journal::append(std::vector<std::pair<std::string, long>> frames,
                      const std::vector<std::string>& files) {
     Unit unit{std::move(frames), {}};
     Json line{{"frames", Json::object()}, {"files", Json::object()}};
-    for (const auto& [key, valid] : unit.frames) line["frames"][key] = valid;
+    auto& named = line["frames"].get_ref<Json::object_t&>();
+    for (const auto& [key, valid] : unit.frames) named.push_back({key, valid});  // none twice
     for (const std::string& name : files) {
         unit.files.emplace_back(name, fs::file_size(path_.parent_path() / name));
         line["files"][name] = unit.files.back().second;
@@ -94,6 +96,10 @@ void Journal::append(std::vector<std::pair<std::string, long>> frames,
     if (descriptor_ < 0) {
         if (path_.has_parent_path()) fs::create_directories(path_.parent_path());
         open();
+        if (lseek(descriptor_, 0, SEEK_END) > 0) {  // it was not there when this run began
+            close();
+            throw InputError(path_.string() + ": another run has written to this output");
+        }
         write(first_);
     }
     write(dumped(line));

@@ -1,10 +1,12 @@
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "capture.hpp"
 #include "depth.hpp"
 #include "depth_stream.hpp"
+#include "journal.hpp"
 #include "registration.hpp"
 #include "xcalib/complete_depth.hpp"
 #include "xcalib/steady_depth.hpp"
@@ -38,6 +40,12 @@ Totals register_live(const RegisterArguments& a, const Rig& rig, Console& consol
     std::unique_ptr<DepthStream> stream;
     if (a.depth_fd >= 0) stream = std::make_unique<DepthStream>(a.depth_fd);
     const DepthPointer plane = plane_depth(a.frames.depth.plane);
+    // The cameras are there: what another run wrote may go now.
+    const Path journal = journal_of(a.output);
+    if (std::filesystem::exists(journal)) {
+        { const Journal removed(journal, {}, true); }
+        std::filesystem::remove(journal);
+    }
     const std::unique_ptr<Sink> sink = open_sink(a.output, a.rate, nullptr);
     sink->begin({});
     std::vector<FrameName> names;

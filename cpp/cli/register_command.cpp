@@ -34,15 +34,10 @@ void run(RegisterArguments a, Console& console) {
     if (a.live) {
         check_output(a);
         // What a camera shows is not to be had again: there is nothing to go on with.
-        const Path journal = journal_of(a.output);
-        if (std::filesystem::exists(journal)) {
-            if (!a.overwrite)
-                throw InputError(a.output +
-                                 " holds another run's frames, expected another output, or"
-                                 " --overwrite");
-            { const Journal removed(journal, {}, true); }
-            std::filesystem::remove(journal);
-        }
+        if (!a.overwrite && std::filesystem::exists(journal_of(a.output)))
+            throw InputError(a.output +
+                             " holds another run's frames, expected another output, or"
+                             " --overwrite");
         totals = register_live(a, rig, console);
     } else {
         if (a.depth_fd >= 0) throw InputError("--depth-fd goes with --live");
@@ -79,8 +74,8 @@ void add_register(CLI::App& app, Console& console) {
         app.add_subcommand("register", "Bring SOURCE images onto the REFERENCE pixels.");
     command->footer(
         "Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no"
-        " depth.\nInterrupted, the same command goes on where it ended: no frame is lost or made"
-        " twice.\nWith --live REFERENCE and SOURCE are cameras: an index of V4L2 (0 is"
+        " depth.\nInterrupted, the same command goes on where it ended: what is whole is not made"
+        " again.\nWith --live REFERENCE and SOURCE are cameras: an index of V4L2 (0 is"
         " /dev/video0), or any source\nthat OpenCV opens: a device, a URL, a GStreamer pipeline.");
     auto arguments = std::make_shared<RegisterArguments>();
     RegisterArguments& a = *arguments;

@@ -102,7 +102,9 @@ class VideoSink : public Sink {
         std::error_code none;
         std::vector<Path> others;
         for (const fs::directory_entry& entry : fs::directory_iterator(parts_, none))
-            if (!ours.count(inside(entry.path()))) others.push_back(entry.path());
+            if (entry.is_regular_file() && is_part(entry.path().filename().string()) &&
+                !ours.count(inside(entry.path())))
+                others.push_back(entry.path());
         for (const Path& file : others) fs::remove(file);
         return done;
     }
@@ -176,6 +178,11 @@ class VideoSink : public Sink {
         });
     }
 
+    // Named by a frame's key: 16 hexadecimal digits.
+    static bool is_part(const std::string& name) {
+        return name.find_first_not_of("0123456789abcdef") == 16;
+    }
+
     // Those whose frames still follow on each other, in order.
     std::vector<Unit> fitting_units(const std::vector<FrameName>& frames) const {
         std::map<std::string, std::size_t> places;
@@ -201,14 +208,16 @@ class VideoSink : public Sink {
 
     // The open part is whole now, and noted.
     void close_part() {
-        if (frames_.empty()) return;
+        // Whatever fails, neither is closed again.
+        auto frames = std::exchange(frames_, {});
+        const auto open = std::exchange(open_, {});
+        if (frames.empty()) return;
         std::vector<std::string> names;
-        for (const std::unique_ptr<Encoder>& encoder : open_) {
-            encoder->close(static_cast<int>(frames_.size()));
+        for (const std::unique_ptr<Encoder>& encoder : open) {
+            encoder->close(static_cast<int>(frames.size()));
             names.push_back(inside(encoder->path()));
         }
-        note(std::exchange(frames_, {}), names);
-        open_.clear();
+        note(std::move(frames), names);
     }
 
     void note(std::vector<std::pair<std::string, long>> frames,

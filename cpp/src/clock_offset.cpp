@@ -119,9 +119,17 @@ struct Samples {
     std::vector<std::vector<double>> columns;
 };
 
+// Footage with pauses has fewer frames than samples; where it is all pause, its times are wrong.
+constexpr double kMostSamples = 32;  // a frame
+
 Samples resampled(Motion motion, double step) {
     const double first = std::ceil(motion.times.front() / step);
     const double last = std::floor(motion.times.back() / step);
+    if (last - first > kMostSamples * static_cast<double>(motion.times.size()))
+        throw InputError(format(
+            "times from %.3f to %.3f s have %zu frames, expected one at least"
+            " every %g s in the mean",
+            motion.times.front(), motion.times.back(), motion.times.size(), kMostSamples * step));
     Samples out{first * step, {}};
     for (std::vector<double>& column : motion.columns) {
         clean(column);

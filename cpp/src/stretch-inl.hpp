@@ -111,7 +111,8 @@ HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, St
     const hn::Repartition<Nearness, IntTag> pairs;
     const CellGrid& grid = *task.grid;
     constexpr int kWindow = 2 * kLanes, kBefore = kWindow / 8;
-    stretch.cells.place<0>(kBefore, grid.width - kBefore, grid.height - 1, 1, grid.width);
+    stretch.cells.place<0>(kBefore, std::max(0, grid.width - kBefore), grid.height - 1, 1,
+                           grid.width);
     for (int i = 0; i < count; ++i) {
         const UsualVector& vector = stretch.vectors[i];
         const Int x = hn::BitCast(di, hn::Load(d, vector.cell_x));

@@ -6,7 +6,9 @@
 
 #include <memory>
 
-namespace xcalib {
+#include "xcalib/export.hpp"
+
+namespace XCALIB_EXPORT xcalib {  // the library of calibration, another, has them from here
 
 class Workers {
    public:

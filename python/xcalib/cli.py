@@ -464,7 +464,7 @@ def register_command(
 
     Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
 
-    Interrupted, the same command goes on where it ended: no frame is lost or made twice.
+    Interrupted, the same command goes on where it ended: what is whole is not made again.
     """
     rig = Rig.load(rig_file)
     frames = open_frames(inputs, threads, rig)

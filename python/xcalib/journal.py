@@ -90,6 +90,10 @@ class Journal:
             if self._descriptor is None:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 self._open()
+                assert self._descriptor is not None
+                if os.fstat(self._descriptor).st_size > 0:  # not there when this run began
+                    self.close()
+                    raise InputError(f"{self.path}: another run has written to this output")
                 self._write(self._first)
             self._write(line)
             self.units.append(unit)
@@ -131,7 +135,11 @@ class Journal:
             units = [Unit(line["frames"], line["files"]) for line in lines[1:]]
             if lines and (lines[0]["format"], lines[0]["version"]) != (FORMAT, VERSION):
                 raise ValueError
-            if any(Path(name).is_absolute() or ".." in name for u in units for name in u.files):
+            if any(
+                Path(name).is_absolute() or ".." in Path(name).parts
+                for u in units
+                for name in u.files
+            ):
                 raise ValueError  # what --overwrite removes is ours
             if not all(unit.frames and unit.files for unit in units):
                 raise ValueError
