@@ -10,8 +10,8 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <string_view>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 
 #include "files.hpp"
