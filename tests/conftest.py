@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,10 @@ from click.testing import CliRunner, Result
 from drive import write_drive
 from xcalib import Rig, synthetic
 from xcalib.cli import cli as python_command
+
+# Of tests in the background of a shell SIGINT is ignored, and so of all that they start.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).resolve().parents[1]
 Process = subprocess.CompletedProcess[str]
