@@ -172,12 +172,13 @@ HWY_INLINE Pair pair_in_window(const std::uint16_t* row, Int index) {
 template <Reach reach>
 HWY_INLINE Pair pair_in_window(const std::uint8_t* row, Int index) {
     const hn::Repartition<std::uint8_t, IntTag> bytes;
-    // Of a place, the upper bit makes it 0, and only the lowest four count.
+    // A byte's place is below 16, or has its upper bit set, which gives 0: of 32, each register is
+    // asked for its own half.
     const auto places = [&](Int at) HWY_ATTR {
+        if constexpr (reach == Reach::two) at = hn::Or(at, hn::ShiftLeft<3>(hn::And(at, set(16))));
         return hn::BitCast(bytes, hn::Or(at, set(static_cast<int>(0x80808000))));
     };
-    const auto low = places(reach == Reach::one ? index : hn::Add(index, set(0x70)));
-    const auto high = places(hn::Add(hn::Xor(index, set(16)), set(0x70)));
+    const auto low = places(index), high = places(hn::Xor(index, set(16)));
     const auto in = [&](const std::uint8_t* from) HWY_ATTR {
         auto found = hn::TableLookupBytesOr0(hn::LoadDup128(bytes, from), low);
         if constexpr (reach == Reach::two)
