@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from xcalib.footage import open_stream
 from xcalib.frames import list_files, read_image, write_image
 
 COPIES = 20  # of the rendered frames
@@ -39,3 +40,11 @@ def contents(out: Path) -> dict[str, bytes]:
     """All that was written, but the journals, whose lines come as threads end."""
     found = files_below(out)
     return {name: p.read_bytes() for name, p in found.items() if not name.endswith(".jsonl")}
+
+
+def same_frames(first: Path, second: Path, tolerance: float = 0) -> None:
+    one, two = open_stream(first), open_stream(second)
+    assert len(one) == len(two)
+    for index in range(len(one)):
+        error = np.abs(one[index].astype(int) - two[index].astype(int)).mean()
+        assert error <= tolerance, f"frame {index}"

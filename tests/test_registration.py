@@ -18,12 +18,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import Result
 
 from conftest import FRAMES, run
-from drive import COPIES, arguments, contents, files_below
+from drive import COPIES, arguments, contents, files_below, same_frames
 from xcalib import Rig, registration
 from xcalib.depth import FolderDepth, NetworkDepth
 from xcalib.footage import Stream, open_stream
@@ -55,14 +54,6 @@ def process(*given: str) -> subprocess.Popen[str]:
 def threads() -> list[threading.Thread]:
     """All but tqdm's watchdog."""
     return [thread for thread in threading.enumerate() if not thread.daemon]
-
-
-def same_frames(first: Path, second: Path, tolerance: float = 0) -> None:
-    one, two = open_stream(first), open_stream(second)
-    assert len(one) == len(two)
-    for index in range(len(one)):
-        error = np.abs(one[index].astype(int) - two[index].astype(int)).mean()
-        assert error <= tolerance, f"frame {index}"
 
 
 # -- Overlapped

@@ -22,7 +22,7 @@ import pytest
 from click.testing import Result
 
 from conftest import FRAMES, Process, run
-from drive import COPIES, arguments, contents, files_below
+from drive import COPIES, arguments, contents, files_below, same_frames
 from test_footage import IDENTITY, THERMAL, VISIBLE, Pan
 from xcalib.footage import open_stream
 from xcalib.footage.encoder import encoder_name
@@ -42,14 +42,6 @@ def assert_equal(first: dict[str, Image], second: dict[str, Image]) -> None:
     assert first.keys() == second.keys()
     for name, image in first.items():
         np.testing.assert_array_equal(image, second[name], name)
-
-
-def same_frames(first: Path, second: Path, tolerance: float = 0) -> None:
-    one, two = open_stream(first), open_stream(second)
-    assert len(one) == len(two)
-    for index in range(len(one)):
-        error = np.abs(one[index].astype(int) - two[index].astype(int)).mean()
-        assert error <= tolerance, f"frame {index}"
 
 
 def interrupted(

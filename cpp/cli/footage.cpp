@@ -17,11 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string six_digits(int index) {
-    const std::string digits = std::to_string(index);
-    return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
-}
-
 // The pages of a TIFF stack.
 class Pages : public Stream {
    public:
@@ -165,6 +160,11 @@ bool is_bag(const Path& path) {
 }
 
 }  // namespace
+
+std::string six_digits(int index) {
+    const std::string digits = std::to_string(index);
+    return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
+}
 
 cv::Mat Stream::operator[](int index) {
     cv::Mat image = read(index);

@@ -43,6 +43,9 @@ class Stream {
 
 using StreamPointer = std::shared_ptr<Stream>;
 
+// The name of a frame that has none of its own: 000007.
+std::string six_digits(int index);
+
 // A list of image files; their times stand in their names or in a table beside them.
 class ImageFiles : public Stream {
    public:

@@ -6,6 +6,7 @@
 #include "capture.hpp"
 #include "depth.hpp"
 #include "depth_stream.hpp"
+#include "footage.hpp"
 #include "journal.hpp"
 #include "registration.hpp"
 #include "xcalib/complete_depth.hpp"
@@ -18,11 +19,6 @@ using Clock = std::chrono::steady_clock;
 
 double milliseconds_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-std::string name_of(int index) {
-    const std::string digits = std::to_string(index);
-    return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
 }
 
 void check(const RegisterArguments& a) {
@@ -75,7 +71,7 @@ Totals register_live(const RegisterArguments& a, const Rig& rig, Console& consol
         const auto before = Clock::now();
         const Registered result = registered(*registrar, reference, source, map->depth, a.overlays);
         const double took = milliseconds_since(before);
-        const std::string name = name_of(totals.frames);
+        const std::string name = six_digits(totals.frames);
         names.push_back({name, name});
         sink->write(totals.frames, names.back(), result);
         const long pixels = static_cast<long>(result.mask.total());

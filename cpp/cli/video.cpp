@@ -35,10 +35,7 @@ class Video : public Stream {
         restart();
     }
     int size() const override { return static_cast<int>(frame_times_.size()); }
-    std::string name(int index) const override {
-        const std::string digits = std::to_string(index);
-        return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
-    }
+    std::string name(int index) const override { return six_digits(index); }
     std::string where(int index) const override {
         return path_.string() + " frame " + std::to_string(index);
     }
