@@ -1,9 +1,11 @@
 """Experiment 7: from how far off is a rig found? Beside ECC and MI a pair, and the paper's Adam.
 
-Parts: `displacement` (ratio of fields of view by displacement), `frames` (roll by frames).
+Parts: `displacement` (ratio of fields of view by displacement), `frames` (frames by roll).
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import islice, product
 
 import cv2
 import numpy as np
@@ -16,6 +18,9 @@ import xcalib
 LIMIT = 2.0
 """Median end-point error of what counts as found [px]: a homography may."""
 BASELINE = 0.1  # [m]
+
+Method = Callable[[Rendered, int], float]
+"""Median end-point error [px], of what may use the first so many frames of a scene."""
 
 
 def rig_of(ratio: float, shift: float, roll_deg: float, angle: float) -> xcalib.Rig:
@@ -31,13 +36,12 @@ def rig_of(ratio: float, shift: float, roll_deg: float, angle: float) -> xcalib.
     return xcalib.Rig(reference, source, roll @ turn, [-BASELINE, 0.01, 0.0])
 
 
-def by_pair(method: Callable) -> Callable[[Rendered], float]:
-    def error(scene: Rendered) -> float:
+def a_pair(method: Callable) -> Method:
+    def error(scene: Rendered, count: int) -> float:
         errors = []
         true = xcalib.Registrar(scene.rig, occlusion="ignore")
-        for reference, source, depth in zip(
-            scene.references, scene.sources, scene.depths, strict=True
-        ):
+        frames = zip(scene.references, scene.sources, scene.depths, strict=True)
+        for reference, source, depth in islice(frames, count):
             images = reference.mean(axis=2).astype(np.float32) / 255, source / np.float32(255)
             try:
                 found = np.linalg.norm(method(*images) - true.map(depth), axis=-1)
@@ -49,120 +53,148 @@ def by_pair(method: Callable) -> Callable[[Rendered], float]:
     return error
 
 
-def by_rig(**options) -> Callable[[Rendered], float]:
-    def error(scene: Rendered) -> float:
+def a_rig(options: Callable[[int], xcalib.CalibrationOptions]) -> Method:
+    def error(scene: Rendered, count: int) -> float:
         try:
-            made = xcalib.CalibrationOptions(
-                **{name: make() if callable(make) else make for name, make in options.items()}
-            )
-            return scene.error(scene.calibrate(made).rig)
+            return scene.error(scene.calibrate(options(count), slice(0, count)).rig)
         except RuntimeError:
             return np.inf
 
     return error
 
 
-METHODS = {
-    "ours": by_rig(),
-    "the paper's Adam": by_rig(solver="adam", adam=lambda: xcalib.AdamOptions(epochs=120)),
-    "ECC, a pair": by_pair(homographies.ecc),
-    "MI affine, a pair": by_pair(mutual_information.affine),
+def adam_options(count: int) -> xcalib.CalibrationOptions:
+    """The paper's 120 steps, of four frames each or of as many as there are."""
+    adam = xcalib.AdamOptions(epochs=480 // max(count, 4))
+    return xcalib.CalibrationOptions(solver="adam", adam=adam)
+
+
+OURS = {"ours": a_rig(lambda count: xcalib.CalibrationOptions())}
+WIDE = {
+    "ours, max_roll_deg = 20": a_rig(
+        lambda count: xcalib.CalibrationOptions(search=xcalib.SearchOptions(max_roll_deg=20))
+    )
+}
+OTHERS = {
+    "the paper's Adam": a_rig(adam_options),
+    "ECC, a pair": a_pair(homographies.ecc),
+    "MI affine, a pair": a_pair(mutual_information.affine),
 }
 RATIOS, SHIFTS = (0.6, 0.8, 1.0, 1.25, 1.67), (0.0, 0.05, 0.1, 0.2, 0.3)
 ROLLS, FRAMES = (0.0, 5.0, 10.0, 20.0), (1, 2, 4, 8)
 
 
-def heat(figure, panels: dict[str, np.ndarray], x, y, xlabel: str, ylabel: str) -> None:
-    all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
-    for axes, (label, values) in zip(all_axes, panels.items(), strict=True):
-        axes.imshow(values, vmin=0, vmax=1, cmap="viridis", origin="lower")
-        axes.set(title=label, xlabel=xlabel)
-        axes.set_xticks(range(len(x)), [f"{v:g}" for v in x])
-        axes.set_yticks(range(len(y)), [f"{v:g}" for v in y])
-        for (row, column), value in np.ndenumerate(values):
-            shade = "k" if value > 0.6 else "w"
-            axes.text(column, row, f"{value:.0%}", ha="center", va="center", color=shade, size=7)
-    all_axes[0].set(ylabel=ylabel)
+@dataclass(frozen=True)
+class Grid:
+    """What is tried, and how it is called: a value of each row and one of each column."""
 
+    rows: tuple[float, ...]
+    row_label: str
+    columns: tuple[float, ...]
+    column_label: str
+    column_unit: str
 
-def table_of(values: np.ndarray, x, y, corner: str) -> tuple[list[str], list[list[str]]]:
-    columns = [corner, *(f"{v:g}" for v in x)]
-    return columns, [
-        [f"{name:g}", *(f"{v:.0%}" for v in row)] for name, row in zip(y, values, strict=True)
-    ]
+    def explore(
+        self, results: Results, methods: dict[str, Method], seeds: int, scene_of
+    ) -> tuple[dict[str, np.ndarray], str]:
+        """Share of the rigs that each method finds in each cell, and how many there are in one.
 
+        `scene_of(seed, row, column)` gives the scene by the numbers of row and column, and how many
+        of its frames may be used.
+        """
+        shape = len(self.rows), len(self.columns)
+        found, done = {label: np.zeros(shape) for label in methods}, np.zeros(shape, int)
+        cells = product(range(seeds), *map(range, shape))
+        for seed, i, j in results.in_time(cells):
+            scene, count = scene_of(seed, i, j)
+            for label, error in methods.items():
+                found[label][i, j] += error(scene, count) < LIMIT
+            done[i, j] += 1
+            told = (f"{v[i, j]:.0f}" for v in found.values())
+            print(seed, self.rows[i], self.columns[j], *told, "of", done[i, j], flush=True)
+        rigs = " to ".join(str(n) for n in sorted({done.min(), done.max()}))
+        with np.errstate(invalid="ignore"):
+            return {label: v / done for label, v in found.items()}, rigs
 
-def rows_of(found: dict[str, np.ndarray], x, y) -> list[list[str]]:
-    """The tables of several methods, one below the other."""
-    return [
-        [f"{label}, {row[0]}", *row[1:]]
-        for label, values in found.items()
-        for row in table_of(values, x, y, "")[1]
-    ]
+    def write(self, results: Results, name: str, found: dict[str, np.ndarray], note: str) -> None:
+        """Tables of the methods, one below the other, and heat maps, side by side."""
+        results.table(
+            name,
+            [
+                f"found at {self.row_label} \\ {self.column_label}",
+                *(f"{v:g}{self.column_unit}" for v in self.columns),
+            ],
+            [
+                [f"{label}, {of:g}", *(self.share(v) for v in row)]
+                for label, values in found.items()
+                for of, row in zip(self.rows, values, strict=True)
+            ],
+            note,
+        )
+        results.plot(name, lambda figure: self.heat(figure, found), (2.4 * len(found), 3))
+
+    @staticmethod
+    def share(value: float) -> str:
+        return f"{value:.0%}" if np.isfinite(value) else "-"
+
+    def heat(self, figure, found: dict[str, np.ndarray]) -> None:
+        all_axes = figure.subplots(1, len(found), squeeze=False)[0]
+        for axes, (label, values) in zip(all_axes, found.items(), strict=True):
+            axes.imshow(values, vmin=0, vmax=1, cmap="viridis", origin="lower", aspect="auto")
+            axes.set_title(label, size=9)
+            axes.set_xlabel(f"{self.column_label} [{self.column_unit.strip()}]", size=8)
+            axes.set_xticks(range(len(self.columns)), [f"{v:g}" for v in self.columns], size=8)
+            axes.set_yticks(range(len(self.rows)), [f"{v:g}" for v in self.rows], size=8)
+            for (row, column), value in np.ndenumerate(values):
+                shade = "k" if value > 0.6 else "w"
+                text = self.share(value)
+                axes.text(column, row, text, ha="center", va="center", color=shade, size=7)
+        all_axes[0].set_ylabel(self.row_label, size=8)
 
 
 def displacement(results: Results) -> None:
-    ratios, shifts = results.of(RATIOS, RATIOS[2:3]), results.of(SHIFTS, SHIFTS[1:2])
-    methods = dict(list(METHODS.items())[: results.of(None, 1)])
-    found = {label: np.zeros((len(ratios), len(shifts))) for label in methods}
-    done = 0
-    for seed in results.in_time(range(results.of(3, 1))):
-        done += 1
-        for i, ratio in enumerate(ratios):
-            for j, shift in enumerate(shifts):
-                rng = np.random.default_rng([seed, i, j])
-                rig = rig_of(ratio, shift, rng.uniform(-2, 2), rng.uniform(0, 2 * np.pi))
-                scene = rendered(rig, 4, 100 + seed)
-                for label, error in methods.items():
-                    found[label][i, j] += error(scene) < LIMIT
-        print(seed, {label: f"{v.mean() / done:.0%}" for label, v in found.items()}, flush=True)
-    found = {label: v / done for label, v in found.items()}
-    results.table(
+    grid = Grid(
+        results.of(RATIOS, RATIOS[2:3]), "ratio of fields of view",
+        results.of(SHIFTS, SHIFTS[1:2]), "displacement", " w",
+    )  # fmt: skip
+
+    def scene_of(seed: int, i: int, j: int) -> tuple[Rendered, int]:
+        rng = np.random.default_rng([seed, i, j])
+        roll, angle = rng.uniform(-2, 2), rng.uniform(0, 2 * np.pi)
+        rig = rig_of(grid.rows[i], grid.columns[j], roll, angle)
+        return rendered(rig, 4, 100 + seed), 4
+
+    methods = OURS | results.of(OTHERS, {})
+    found, rigs = grid.explore(results, methods, results.of(3, 1), scene_of)
+    grid.write(
+        results,
         "displacement",
-        ["found at ratio of fields of view \\ displacement", *(f"{s:g} w" for s in shifts)],
-        rows_of(found, shifts, ratios),
-        f"{done} rendered rig{'s' * (done > 1)} of 320x240 in each cell, 4 frames, baseline"
-        f" {BASELINE:g} m, roll within 2 deg; found: median end-point error under {LIMIT:g} px."
-        " Ratio of tangents, source to reference (50 deg); displacement in widths, any direction.",
-    )
-    results.plot(
-        "displacement",
-        lambda figure: heat(
-            figure, found, shifts, ratios, "displacement [widths]", "ratio of fields of view"
-        ),
-        (11, 3),
+        found,
+        f"Rendered rigs of 320x240, {rigs} in each cell, 4 frames, baseline {BASELINE:g} m, roll"
+        f" within 2 deg; found: median end-point error under {LIMIT:g} px. Ratio of tangents,"
+        " source to reference (50 deg); displacement in widths w, in any direction.",
     )
 
 
 def frames(results: Results) -> None:
-    rolls, counts = results.of(ROLLS, ROLLS[:1]), results.of(FRAMES, FRAMES[1:2])
-    done = 0
-    ranges = {"ours": 5.0, "ours, max_roll_deg = 20": 20.0}
-    found = {label: np.zeros((len(counts), len(rolls))) for label in ranges}
-    for seed in results.in_time(range(results.of(3, 1))):
-        done += 1
-        for j, roll in enumerate(rolls):
-            rng = np.random.default_rng([seed, j])
-            rig = rig_of(rng.uniform(0.8, 1.25), 0.1, roll, rng.uniform(0, 2 * np.pi))
-            scene = rendered(rig, max(counts), 200 + seed)
-            for i, count in enumerate(counts):
-                for label, limit in ranges.items():
-                    search = xcalib.SearchOptions(max_roll_deg=limit)
-                    options = xcalib.CalibrationOptions(search=search)
-                    result = scene.calibrate(options, slice(0, count))
-                    found[label][i, j] += scene.error(result.rig) < LIMIT
-        print(seed, {k: v.mean() / done for k, v in found.items()}, flush=True)
-    values = {label: v / done for label, v in found.items()}
-    results.table(
-        "frames",
-        ["found at frames \\ roll", *(f"{r:g} deg" for r in rolls)],
-        rows_of(values, rolls, counts),
-        f"{done} rendered rig{'s' * (done > 1)} of 320x240 in each cell, displaced by 0.1 of the"
-        " width, ratio of fields of view 0.8-1.25; the search looks for rolls within 5 deg unless"
-        " told otherwise.",
+    grid = Grid(
+        results.of(FRAMES, FRAMES[1:2]), "frames", results.of(ROLLS, ROLLS[:1]), "roll", " deg"
     )
-    results.plot(
-        "frames", lambda figure: heat(figure, values, rolls, counts, "roll [deg]", "frames"), (7, 3)
+
+    def scene_of(seed: int, i: int, j: int) -> tuple[Rendered, int]:
+        rng = np.random.default_rng([seed, j])  # the same rig for all numbers of frames
+        rig = rig_of(rng.uniform(0.8, 1.25), 0.1, grid.columns[j], rng.uniform(0, 2 * np.pi))
+        return rendered(rig, max(grid.rows), 200 + seed), grid.rows[i]
+
+    methods = OURS | WIDE | results.of(OTHERS, {})
+    found, rigs = grid.explore(results, methods, results.of(3, 1), scene_of)
+    grid.write(
+        results,
+        "frames",
+        found,
+        f"Rendered rigs of 320x240, {rigs} in each cell, displaced by 0.1 of the width, ratio of"
+        " fields of view 0.8-1.25; the search looks for rolls within 5 deg unless told otherwise."
+        f" Found: median end-point error under {LIMIT:g} px, of a rig over all 8 frames.",
     )
 
 

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
+#include "correlate_patches.hpp"
 #include "mat.hpp"
 #include "parallel.hpp"
 
@@ -125,110 +127,67 @@ Edges warped_by(const Edges& edges, const cv::Mat& flow_x, const cv::Mat& flow_y
     return out;
 }
 
-constexpr float kUnknown = -2.0f;
-
-// One plane of values, one for each cell, for each shift.
+// One value for each shift of each cell.
 struct Volume {
-    int radius = 0;
-    std::vector<cv::Mat> score;  // (2 radius + 1)^2, row by row, in [-1, 1], or kUnknown
+    int radius = 0, pitch = 0;
+    cv::Size grid;
+    std::vector<float> score;  // by dy, row, column and dx; in [-1, 1], or kNoCorrelation
 
-    const cv::Mat& at(int dx, int dy) const {
-        return score[(dy + radius) * (2 * radius + 1) + dx + radius];
+    float* row(int dy) {
+        return &score[static_cast<std::size_t>(dy + radius) * grid.area() * pitch];
+    }
+    float at(int cell, int dx, int dy) const {
+        const std::size_t row = static_cast<std::size_t>(dy + radius) * grid.area() + cell;
+        return score[row * pitch + dx + radius];
     }
 };
 
-cv::Mat squares(const Edges& edges) {
-    cv::Mat sum = edges.z[0].mul(edges.z[0]);
-    for (int k = 1; k < kChannels; ++k) sum += edges.z[k].mul(edges.z[k]);
-    return sum;
-}
+// What a correlation reads of an image's edges, with a margin of nothing around.
+struct EdgePlanes {
+    std::array<cv::Mat, kChannels> z;
+    cv::Mat square, weight;
 
-cv::Mat padded(const cv::Mat& map, int margin) {
-    cv::Mat out;
-    cv::copyMakeBorder(map, out, margin, margin, margin, margin, cv::BORDER_CONSTANT,
-                       cv::Scalar(0));
-    return out;
-}
+    EdgePlanes(const Edges& edges, int margin, int right) {
+        const auto padded = [&](const cv::Mat& map, cv::Mat& out) {
+            cv::copyMakeBorder(map, out, margin, margin, margin, right, cv::BORDER_CONSTANT,
+                               cv::Scalar(0));
+        };
+        for (int k = 0; k < kChannels; ++k) padded(edges.z[k], z[k]);
+        padded(edges.weight, weight);
+        square = z[0].mul(z[0]) + z[1].mul(z[1]);
+    }
+
+    EdgeRows from(int y) const {
+        return {z[0].ptr<float>(y), z[1].ptr<float>(y), square.ptr<float>(y), weight.ptr<float>(y),
+                weight.step1()};
+    }
+};
 
 // Weights of the cells of a patch along one side: most in the middle, so that a vector speaks for
 // where it stands.
-cv::Mat patch_profile(int cells) {
-    cv::Mat profile(1, cells, CV_32F);
-    for (int i = 0; i < cells; ++i) {
-        const double s = std::sin(CV_PI * (i + 1) / (cells + 1));
-        profile.at<float>(i) = static_cast<float>(s * s);
-    }
-    return profile / cv::sum(profile)[0];
+std::vector<float> patch_profile(int cells) {
+    std::vector<double> profile(cells);
+    for (int i = 0; i < cells; ++i)
+        profile[i] = std::pow(std::sin(CV_PI * (i + 1) / (cells + 1)), 2);
+    const double sum = std::accumulate(profile.begin(), profile.end(), 0.0);
+    std::vector<float> out;
+    for (const double weight : profile) out.push_back(static_cast<float>(weight / sum));
+    return out;
 }
 
-// Normalized correlation of all patches at all shifts, over the pixels that both images have:
-//     sum w a . b_d / sqrt( sum w |a|^2 m_d  sum w m |b_d|^2 )
+// Of all patches of a at all shifts of b.
 Volume correlate(const Edges& a, const Edges& b, int radius, const FlowOptions& options,
                  int num_threads) {
-    const int step = options.step;
-    const cv::Size grid(a.size().width / step, a.size().height / step);
-    const cv::Mat profile = patch_profile(options.patch / step);
-    const cv::Mat a_square = squares(a);
-    const cv::Mat b_square = padded(squares(b), radius), b_weight = padded(b.weight, radius);
-    std::array<cv::Mat, kChannels> bz;
-    for (int k = 0; k < kChannels; ++k) bz[k] = padded(b.z[k], radius);
-    const int side = 2 * radius + 1, width = grid.width * step;
-    Volume volume{radius, std::vector<cv::Mat>(side * side)};
-    parallel_each(side * side, num_threads, [&](int index) {
-        const int dy = index / side, dx = index % side;  // from the padded corner
-        cv::Mat cross(grid, CV_32F), a_energy(grid, CV_32F), b_energy(grid, CV_32F),
-            both(grid, CV_32F);
-        std::vector<float> sums(4 * static_cast<std::size_t>(width));
-        float* const c = sums.data();
-        float* const p = c + width;
-        float* const q = p + width;
-        float* const n = q + width;
-        for (int row = 0; row < grid.height; ++row) {
-            std::fill(sums.begin(), sums.end(), 0.0f);
-            for (int y = row * step; y < (row + 1) * step; ++y) {
-                const float* const a0 = a.z[0].ptr<float>(y);
-                const float* const a1 = a.z[1].ptr<float>(y);
-                const float* const aa = a_square.ptr<float>(y);
-                const float* const am = a.weight.ptr<float>(y);
-                const float* const b0 = bz[0].ptr<float>(y + dy) + dx;
-                const float* const b1 = bz[1].ptr<float>(y + dy) + dx;
-                const float* const bb = b_square.ptr<float>(y + dy) + dx;
-                const float* const bm = b_weight.ptr<float>(y + dy) + dx;
-#pragma GCC ivdep
-                for (int x = 0; x < width; ++x) {
-                    c[x] += a0[x] * b0[x] + a1[x] * b1[x];
-                    p[x] += aa[x] * bm[x];
-                    q[x] += bb[x] * am[x];
-                    n[x] += am[x] * bm[x];
-                }
-            }
-            for (int column = 0; column < grid.width; ++column) {
-                float sum[4] = {0, 0, 0, 0};
-                for (int k = 0; k < 4; ++k)
-                    for (int x = 0; x < step; ++x) sum[k] += sums[k * width + column * step + x];
-                cross.at<float>(row, column) = sum[0];
-                a_energy.at<float>(row, column) = sum[1];
-                b_energy.at<float>(row, column) = sum[2];
-                both.at<float>(row, column) = sum[3];
-            }
-        }
-        const auto over_patch = [&profile](cv::Mat& plane) {
-            cv::Mat out;
-            cv::sepFilter2D(plane, out, CV_32F, profile, profile, cv::Point(-1, -1), 0,
-                            cv::BORDER_CONSTANT);
-            plane = out;
-        };
-        for (cv::Mat* plane : {&cross, &a_energy, &b_energy, &both}) over_patch(*plane);
-        constexpr float kEnough = 0.35f;  // of a patch
-        for (int row = 0; row < grid.height; ++row)
-            for (int column = 0; column < grid.width; ++column) {
-                float& value = cross.at<float>(row, column);
-                const float norm =
-                    a_energy.at<float>(row, column) * b_energy.at<float>(row, column);
-                const bool known = both.at<float>(row, column) > kEnough * step * step;
-                value = known && norm > 1e-8f ? value / std::sqrt(norm) : kUnknown;
-            }
-        volume.score[index] = cross;
+    const int side = 2 * radius + 1;
+    const int pitch = (side + kShiftsAtOnce - 1) / kShiftsAtOnce * kShiftsAtOnce;
+    const std::vector<float> profile = patch_profile(options.patch / options.step);
+    const PatchGrid grid{a.size().width / options.step, a.size().height / options.step,
+                         options.step, profile.data(), static_cast<int>(profile.size())};
+    const EdgePlanes still(a, 0, 0), moved(b, radius, radius + pitch - side);
+    Volume volume{radius, pitch, cv::Size(grid.width, grid.height), {}};
+    volume.score.resize(static_cast<std::size_t>(side) * volume.grid.area() * pitch);
+    parallel_each(side, num_threads, [&](int index) {
+        correlate_patches(still.from(0), moved.from(index), grid, side, volume.row(index - radius));
     });
     return volume;
 }
@@ -241,11 +200,11 @@ struct Peak {
     float curvature = 0;  // in the flattest direction [1/px^2]
 };
 
-Peak best_shift(const Volume& volume, int column, int row) {
+Peak best_shift(const Volume& volume, int cell) {
     const int r = volume.radius;
-    const auto score = [&](int dx, int dy) { return volume.at(dx, dy).at<float>(row, column); };
+    const auto score = [&](int dx, int dy) { return volume.at(cell, dx, dy); };
     int bx = 0, by = 0;
-    float best = kUnknown;
+    float best = kNoCorrelation;
     for (int dy = -r; dy <= r; ++dy)
         for (int dx = -r; dx <= r; ++dx)
             if (score(dx, dy) > best) {
@@ -269,7 +228,7 @@ Peak best_shift(const Volume& volume, int column, int row) {
     // A neighbour without enough valid pixels has no value to put a paraboloid through.
     for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx)
-            if (score(bx + dx, by + dy) == kUnknown) return peak;
+            if (score(bx + dx, by + dy) == kNoCorrelation) return peak;
     // The paraboloid through the nine values around the peak.
     const auto at = [&](int dx, int dy) { return score(bx + dx, by + dy); };
     const float gx = 0.5f * (at(1, 0) - at(-1, 0)), gy = 0.5f * (at(0, 1) - at(0, -1));
@@ -356,7 +315,7 @@ FlowField one_way(const Pyramid& a, const Pyramid& b, const FlowOptions& options
                 const std::size_t i = static_cast<std::size_t>(row) * field.width + column;
                 const int x = column * options.step + options.step / 2;
                 const int y = row * options.step + options.step / 2;
-                const Peak peak = best_shift(volume, column, row);
+                const Peak peak = best_shift(volume, static_cast<int>(i));
                 field.x[i] = flow_x.at<float>(y, x) + peak.x;
                 field.y[i] = flow_y.at<float>(y, x) + peak.y;
                 // Height, texture in both directions, distinctness; and all that at coarser levels.
