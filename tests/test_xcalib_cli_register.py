@@ -26,7 +26,9 @@ from drive import COPIES, arguments, contents, files_below, same_frames
 from test_footage import IDENTITY, THERMAL, VISIBLE, Pan
 from xcalib.footage import open_stream
 from xcalib.footage.encoder import encoder_name
+from xcalib.footage.writer import journal_of
 from xcalib.frames import Image, list_files, read_image, write_image
+from xcalib.journal import Journal
 
 TOTAL = FRAMES * COPIES
 Both = Callable[..., tuple[Process, Result]]
@@ -396,6 +398,30 @@ def test_two_runs_at_one_output(
         (results[1].exit_code, results[1].stderr),
     ):
         assert code == 2 and "another run is writing to this output" in text
+
+
+def test_two_runs_that_begin_one_video(
+    cli: Callable[..., Process], drive: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "new" / "out.mkv"
+    with Journal(journal_of(out), {}):  # nothing is written yet
+        results = cli(*arguments(drive, out)), run(*arguments(drive, out))
+    assert (results[0].returncode, results[1].exit_code) == (2, 2)
+    for result in results:
+        assert "another run is writing to this output" in result.stderr
+    assert not out.parent.exists()
+
+
+def test_a_journal_of_many_frames(cli: Callable[..., Process], drive: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.mkv"
+    assert cli(*arguments(drive, out)).returncode == 0
+    journal = journal_of(out)
+    first, *units = journal.read_text().splitlines()
+    unit = json.loads(units[-1])
+    others = {f"{i:016x}": 1 for i in range(300_000)}  # looked up one by one: an hour
+    longer = json.dumps({"frames": unit["frames"] | others, "files": unit["files"]})
+    journal.write_text("\n".join([first, *units[:-1], longer, units[-1], ""]))
+    assert cli(*arguments(drive, out)).returncode == 0
 
 
 @pytest.mark.parametrize("out", ["out", "out.mkv", "out.mp4"])

@@ -121,4 +121,4 @@ def run(results: Results, part: str | None) -> None:
         axes.grid(alpha=0.3)
         axes.legend(bbox_to_anchor=(1.0, 1.0))
 
-    results.plot("metrics", draw)
+    results.plot("metrics", draw, keep=False)

@@ -69,8 +69,13 @@ class Results:
         if not self.quick:
             replace_in_docs(stem, text)
 
-    def plot(self, name: str, draw, size: tuple[float, float] = (6.5, 3.6)) -> None:
-        """`draw(figure)` fills a figure of that many inches."""
+    def plot(
+        self, name: str, draw, size: tuple[float, float] = (6.5, 3.6), keep: bool = True
+    ) -> None:
+        """`draw(figure)` fills a figure of that many inches; `keep`: in the docs, too.
+
+        Of real data nothing is kept there, not even a plot.
+        """
         import matplotlib
 
         matplotlib.use("Agg")
@@ -83,7 +88,7 @@ class Results:
         pyplot.close(figure)
         stem = f"{self.experiment}_{name}.png"
         write_whole(self.folder / stem, data.getvalue())
-        if not self.quick:
+        if keep and not self.quick:
             write_whole(PLOTS / stem, data.getvalue())
 
 

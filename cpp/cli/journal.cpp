@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -25,16 +26,25 @@ std::string dumped(const Json& value) {
     return value.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
-Unit unit_of(const Json& line) {
+// A video's frames are many: an object that keeps their order would look for each among all those
+// before, so both lists are noted as they are read.
+Unit unit_of(const std::string& line) {
+    using Event = nlohmann::json::parse_event_t;
     Unit unit;
-    for (const auto& [key, valid] : line.at("frames").items())
-        unit.frames.emplace_back(key, valid.get<long>());
-    for (const auto& [name, size] : line.at("files").items()) {
+    std::string section, key;
+    const auto note = [&](int depth, Event event, const nlohmann::json& value) {
+        if (event == Event::key) (depth == 1 ? section : key) = value.get<std::string>();
+        if (event != Event::value || depth != 2) return true;
+        if (section == "frames") unit.frames.emplace_back(key, value.get<long>());
+        if (section == "files") unit.files.emplace_back(key, value.get<std::uintmax_t>());
+        return true;
+    };
+    if (!nlohmann::json::parse(line, note).is_object()) throw std::invalid_argument(line);
+    for (const auto& [name, size] : unit.files) {
         // What --overwrite removes is ours.
         const Path file(name);
         if (file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end())
             throw std::invalid_argument(name);
-        unit.files.emplace_back(name, size.get<std::uintmax_t>());
     }
     if (unit.frames.empty() || unit.files.empty()) throw std::invalid_argument("empty");
     return unit;
@@ -65,9 +75,8 @@ Journal::Journal(Path path, const MadeWith& made_with, bool overwrite) : path_(s
     Json values = Json::object();
     for (const auto& [name, value] : made_with) values[name] = value;
     first_ = dumped({{"format", kFormat}, {"version", kVersion}, {"made_with", values}});
-    if (!fs::is_regular_file(path_)) return;
-    open();
     try {
+        open();
         load(made_with, overwrite);
     } catch (...) {
         close();
@@ -78,8 +87,13 @@ Journal::Journal(Path path, const MadeWith& made_with, bool overwrite) : path_(s
 Journal::~Journal() { close(); }
 
 void Journal::close() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    descriptor_ = -1;
+    std::error_code ignored;
+    if (descriptor_ >= 0) {
+        if (lseek(descriptor_, 0, SEEK_END) == 0) fs::remove(path_, ignored);
+        ::close(descriptor_);
+        descriptor_ = -1;
+    }
+    for (const Path& folder : made_folders_) fs::remove(folder, ignored);  // if it is empty
 }
 
 void Journal::append(std::vector<std::pair<std::string, long>> frames,
@@ -93,25 +107,26 @@ void Journal::append(std::vector<std::pair<std::string, long>> frames,
         line["files"][name] = unit.files.back().second;
     }
     const std::lock_guard lock(mutex_);
-    if (descriptor_ < 0) {
-        if (path_.has_parent_path()) fs::create_directories(path_.parent_path());
-        open();
-        if (lseek(descriptor_, 0, SEEK_END) > 0) {  // it was not there when this run began
-            close();
-            throw InputError(path_.string() + ": another run has written to this output");
-        }
-        write(first_);
-    }
+    if (lseek(descriptor_, 0, SEEK_END) == 0) write(first_);
     write(dumped(line));
     units_.push_back(std::move(unit));
 }
 
 void Journal::open() {
-    descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-    if (descriptor_ < 0) throw std::system_error(errno, std::generic_category(), path_.string());
-    if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-        close();
-        throw InputError(path_.string() + ": another run is writing to this output");
+    for (Path folder = path_.parent_path(); !folder.empty() && !fs::exists(folder);
+         folder = folder.parent_path())
+        made_folders_.push_back(folder);
+    if (path_.has_parent_path()) fs::create_directories(path_.parent_path());
+    while (descriptor_ < 0) {
+        const int file = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+        if (file < 0) throw std::system_error(errno, std::generic_category(), path_.string());
+        if (flock(file, LOCK_EX | LOCK_NB) != 0) {
+            ::close(file);
+            throw InputError(path_.string() + ": another run is writing to this output");
+        }
+        struct stat state {};
+        if (fstat(file, &state) == 0 && state.st_nlink > 0) descriptor_ = file;
+        else ::close(file);  // removed by the run that held it
     }
 }
 
@@ -136,11 +151,11 @@ void Journal::load(const MadeWith& made_with, bool overwrite) {
     try {
         std::istringstream lines(whole);
         for (std::string line; std::getline(lines, line);) {
-            const Json parsed = Json::parse(line);
             if (!before.is_null()) {
-                units.push_back(unit_of(parsed));
+                units.push_back(unit_of(line));
                 continue;
             }
+            const Json parsed = Json::parse(line);
             if (parsed.at("format") != kFormat || parsed.at("version") != kVersion)
                 throw std::invalid_argument("format");
             before = parsed.at("made_with");
@@ -162,10 +177,9 @@ void Journal::load(const MadeWith& made_with, bool overwrite) {
             throw InputError(path_.string() + ": this output was made otherwise (" + differs +
                              "); expected the same, another output, or --overwrite");
     }
-    if (overwrite || before.is_null()) {
+    if (overwrite) {
         if (ftruncate(descriptor_, 0) != 0)
             throw std::system_error(errno, std::generic_category(), path_.string());
-        write(first_);
         return;
     }
     if (whole.size() < data.size() && ftruncate(descriptor_, static_cast<off_t>(whole.size())) != 0)

@@ -25,12 +25,13 @@ struct Unit {
 // By name, in the order in which differences are told.
 using MadeWith = std::vector<std::pair<std::string, std::string>>;
 
-// The journal of one output, held by one process at a time.
+// The journal of one output, held by one process at a time. Until there is a first unit the file is
+// empty, and goes when it is closed.
 class Journal {
    public:
-    // The file is made with the first unit. `made_with`: all that decides what the output is, apart
-    // from the frames themselves. `overwrite`: remove what is there instead of going on from it.
-    // Throws InputError where what is there was made otherwise, is not a journal, or another
+    // The folder is made where there is none. `made_with`: all that decides what the output is,
+    // apart from the frames themselves. `overwrite`: remove what is there instead of going on from
+    // it. Throws InputError where what is there was made otherwise, is not a journal, or another
     // process is at it.
     Journal(Path path, const MadeWith& made_with, bool overwrite);
     ~Journal();
@@ -52,6 +53,7 @@ class Journal {
 
     Path path_;
     std::string first_;
+    std::vector<Path> made_folders_;  // deepest first
     std::vector<Unit> units_;
     std::mutex mutex_;
     int descriptor_ = -1;

@@ -7,6 +7,7 @@ that whatever moment a run ends at, the journal never promises what is not there
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -35,10 +36,12 @@ class Unit:
 class Journal:
     """The journal of one output, held by one process at a time.
 
+    Until there is a first unit the file is empty, and goes when it is closed.
+
     Parameters
     ----------
     path
-        The file; it is made with the first unit.
+        The file, in a folder that is made where there is none.
     made_with
         All that decides what the output is, apart from the frames themselves.
     overwrite
@@ -56,11 +59,10 @@ class Journal:
         """Units whose files are all there, in the size that they were written."""
         self._first = json.dumps({"format": FORMAT, "version": VERSION, "made_with": made_with})
         self._lock = threading.Lock()
-        self._descriptor: int | None = None
-        if not path.is_file():
-            return
-        self._open()
+        self._descriptor = -1
+        self._made_folders: list[Path] = []
         try:
+            self._open()
             self._load(json.loads(self._first)["made_with"], overwrite)
         except BaseException:
             self.close()
@@ -79,21 +81,20 @@ class Journal:
 
     def close(self) -> None:
         """Let another process have it."""
-        if self._descriptor is not None:
+        if self._descriptor >= 0:
+            if os.fstat(self._descriptor).st_size == 0:
+                self.path.unlink(missing_ok=True)
             os.close(self._descriptor)
-            self._descriptor = None
+            self._descriptor = -1
+        for folder in self._made_folders:
+            with contextlib.suppress(OSError):  # it holds something
+                folder.rmdir()
 
     def append(self, unit: Unit) -> None:
         """Note that the files of a unit are whole; from any thread."""
         line = json.dumps({"frames": unit.frames, "files": unit.files})
         with self._lock:
-            if self._descriptor is None:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                self._open()
-                assert self._descriptor is not None
-                if os.fstat(self._descriptor).st_size > 0:  # not there when this run began
-                    self.close()
-                    raise InputError(f"{self.path}: another run has written to this output")
+            if os.fstat(self._descriptor).st_size == 0:
                 self._write(self._first)
             self._write(line)
             self.units.append(unit)
@@ -110,15 +111,22 @@ class Journal:
             return False
 
     def _open(self) -> None:
-        self._descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            self.close()
-            raise InputError(f"{self.path}: another run is writing to this output") from None
+        folder = self.path.parent
+        self._made_folders = [p for p in (folder, *folder.parents) if not p.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+        while True:
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                os.close(descriptor)
+                raise InputError(f"{self.path}: another run is writing to this output") from None
+            if os.fstat(descriptor).st_nlink > 0:
+                self._descriptor = descriptor
+                return
+            os.close(descriptor)  # removed by the run that held it
 
     def _write(self, line: str) -> None:
-        assert self._descriptor is not None
         data = (line + "\n").encode()
         start = os.fstat(self._descriptor).st_size
         if os.write(self._descriptor, data) != len(data):
@@ -126,7 +134,6 @@ class Journal:
             raise OSError(f"{self.path}: no space left for it")
 
     def _load(self, made_with: Mapping[str, Any], overwrite: bool) -> None:
-        assert self._descriptor is not None
         data = self.path.read_bytes()
         whole = data[: data.rfind(b"\n") + 1]  # a killed run may leave half a line
         lines = []
@@ -157,9 +164,8 @@ class Journal:
                 f" ({_differences(lines[0]['made_with'], made_with)}); expected the same, another"
                 " output, or --overwrite"
             )
-        if overwrite or not lines:
+        if overwrite:
             os.ftruncate(self._descriptor, 0)
-            self._write(self._first)
             return
         if len(whole) < len(data):
             os.ftruncate(self._descriptor, len(whole))
