@@ -214,6 +214,7 @@ Json json_of(const CalibrationReport& report) {
             {"baseline_nec", number(report.baseline_nec)},
             {"contrast", number(report.contrast)},
             {"repeatability_px", number(report.repeatability_px)},
+            {"visible_shift_px", number(report.visible_shift_px)},
             {"valid_share", number(report.valid_share)},
             {"frames", report.frames},
             {"candidates", candidates},

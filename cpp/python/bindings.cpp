@@ -250,6 +250,7 @@ py::dict dict_of(const CalibrationReport& report) {
         py::arg("working_height") = report.working_height, py::arg("nec") = report.nec,
         py::arg("baseline_nec") = report.baseline_nec, py::arg("contrast") = report.contrast,
         py::arg("repeatability_px") = report.repeatability_px,
+        py::arg("visible_shift_px") = report.visible_shift_px,
         py::arg("valid_share") = report.valid_share, py::arg("frames") = report.frames,
         py::arg("candidates") = candidates, py::arg("levels") = levels, py::arg("steps") = steps);
 }
@@ -530,6 +531,11 @@ A rig that was calibrated with it has its translation in the unit that the scale
                       "Of the NEC above the baseline, in deviations over displacements.")
         .def_readonly("repeatability_px", &CalibrationReport::repeatability_px,
                       "Median distance between fits to two halves of the frames [working px].")
+        .def_readonly(
+            "visible_shift_px", &CalibrationReport::visible_shift_px,
+            "Length of the shift, linear over the image, that flow between the registered\n"
+            "images still sees, at most in 90 % of the pixels [working px]; NaN where it\n"
+            "cannot tell.")
         .def_readonly("valid_share", &CalibrationReport::valid_share,
                       "Of the reference's edge energy.")
         .def_readonly("frames", &CalibrationReport::frames, "Indices of the pairs used.")

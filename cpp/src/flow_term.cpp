@@ -13,7 +13,6 @@ namespace xcalib {
 namespace {
 
 constexpr double kSoft = 2.0 / 640;  // half widths
-constexpr int kCell = 7;             // [px] a side, of which one vector is taken
 constexpr float kConfidence = 0.1f;  // below it a vector is not used
 // The weights are shares of all confidence, but of no less than this share of all cells: where
 // nearly nothing can be told, that is no voice as loud as the images'.
@@ -39,7 +38,7 @@ void for_each(const FlowTargets& targets, const Rig& rig, const Work& work) {
 // The most confident vector of each cell, as a target.
 FlowTargets targets_of(const FlowField& field, const Image& depth, const Rig& rig) {
     FlowTargets out{rig, {}};
-    const int side = std::max(1, kCell / field.step);  // in vectors
+    const int side = std::max(1, kFlowCell / field.step);  // in vectors
     const auto depth_at = [&](double x, double y) {
         const long column = std::lround(x), row = std::lround(y);
         const bool inside = column >= 0 && row >= 0 && column < depth.width && row < depth.height;
@@ -153,7 +152,7 @@ std::vector<FlowTargets> estimate_flow(const WorkingImages& images, int factor, 
                                     : patch_flow(reference, warped.image, valid.data(), patches, 1);
         require_field(field, reference);
         out[i] = targets_of(field, level_images.depths[i], at_level);
-        cells[i] = static_cast<double>(reference.pixels.size()) / (kCell * kCell);
+        cells[i] = static_cast<double>(reference.pixels.size()) / (kFlowCell * kFlowCell);
     };
     // A caller's estimator may not be called by two threads at once.
     parallel_each(static_cast<int>(images.size()), estimator ? 1 : num_threads, estimate);

@@ -15,6 +15,8 @@
 
 namespace xcalib {
 
+constexpr int kFlowCell = 7;  // [px] a side, of which one vector is taken
+
 struct FlowTarget {
     float x, y, depth;  // reference pixel, and its depth [m]
     float u, v;         // source point [px]

@@ -6,6 +6,7 @@
 
 #include "format.hpp"
 #include "solve.hpp"
+#include "visible_shift.hpp"
 
 namespace xcalib {
 namespace {
@@ -59,7 +60,8 @@ Level half_of(const Level& level, std::size_t first) {
 
 void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
            CalibrationReport& report) {
-    constexpr double kDetail = 0.5, kContrast = 5.0, kRepeatability = 1.0, kShare = 0.05;
+    constexpr double kDetail = 0.5, kContrast = 5.0, kRepeatability = 1.0, kShift = 3.0,
+                     kShare = 0.05;
     const Level level = make_level(images, kFactor, rig, options.num_threads);
     const double here = pooled(level, rig, options.num_threads).nec;
     const Baseline baseline = displaced(level, rig, options.num_threads);
@@ -77,6 +79,8 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
                         halves[k]);
         report.repeatability_px = median_distance(level, halves[0], halves[1]);
     }
+
+    report.visible_shift_px = visible_shift(images, rig, options.num_threads);
 
     // Where the fit is some pixels off, coarse edges still meet and fine ones do not.
     const double coarse =
@@ -107,6 +111,11 @@ void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions
             "two halves of the frames disagree by %.2f px, expected at most "
             "%.1f",
             report.repeatability_px, kRepeatability);
+    else if (report.visible_shift_px > kShift)
+        report.message = format(
+            "flow between the registered images still sees a shift of %.1f px, expected at most "
+            "%.0f",
+            report.visible_shift_px, kShift);
     else {
         report.converged = true;
         report.message = format(

@@ -6,7 +6,8 @@
 
 namespace xcalib {
 
-// Fills converged, message, baseline_nec, contrast and repeatability_px of the report.
+// Fills converged, message, baseline_nec, contrast, repeatability_px and visible_shift_px of the
+// report.
 void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
            CalibrationReport& report);
 

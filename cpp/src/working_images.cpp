@@ -47,10 +47,10 @@ void for_frame(const char* name, int index, const Work& work) {
     }
 }
 
-// Depth without its edges, for the finer levels (at coarser ones nearly everything is near an edge,
-// and a pixel's width matters less): across one, the warp shows a surface beside another that the
-// source camera may not see there at all, and the step between them moves with the depth, not the
-// rig.
+// Depth without its edges, for the NEC of the finer levels (at coarser ones nearly everything is
+// near an edge, and a pixel's width matters less; a patch of the flow is wider): across one, the
+// warp shows a surface beside another that the source camera may not see there at all, and the step
+// between them moves with the depth, not the rig.
 Image without_depth_edges(const Image& depth) {
     constexpr float kEdge = 1.1f, kFar = std::numeric_limits<float>::max();
     const int width = depth.width;
@@ -147,8 +147,6 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
             level.references[i] = resize_area(images.references[i], w, h);
             level.depths[i] = resize_depth(depth, w, h);
             if (factor >= kCoarse) level.edges[i] = reduced(images.reference_edges[i], w, h);
-            else if (options.parts.depth_edges)
-                level.depths[i] = without_depth_edges(level.depths[i]);
         }
     });
     images.times->prepare += nanoseconds_since(start);
@@ -234,12 +232,14 @@ Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, in
     // Where the reference is finer than its partner, it is blurred to match.
     const double reference_blur = kBlur * std::max(1.0, 1 / density);
     const Rig at_level = level.rig_at(rig);
+    const bool edges = factor >= kCoarse || !images.parts.depth_edges;
     fill(level, images, rig, num_threads, [&](int i) {
+        const Image& depth = reduced.depths[i];
         return std::make_unique<NecPair>(make_nec_frame(
             gaussian_blur(reduced.references[i], reference_blur),
             gaussian_blur(resize_area(images.sources[i], level.source_width, level.source_height),
                           kBlur),
-            reduced.depths[i], at_level, floor_of(images.parts)));
+            edges ? depth : without_depth_edges(depth), at_level, floor_of(images.parts)));
     });
     return level;
 }

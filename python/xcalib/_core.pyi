@@ -324,6 +324,11 @@ class CalibrationReport:
     def repeatability_px(self) -> float:
         """Median distance between fits to two halves of the frames [working px]."""
     @property
+    def visible_shift_px(self) -> float:
+        """Length of the shift, linear over the image, that flow between the registered
+        images still sees, at most in 90 % of the pixels [working px]; NaN where it
+        cannot tell."""
+    @property
     def valid_share(self) -> float:
         """Of the reference's edge energy."""
     @property
