@@ -412,6 +412,16 @@ def test_two_runs_that_begin_one_video(
     assert not out.parent.exists()
 
 
+def test_a_link_to_what_is_not_there_is_kept(
+    cli: Callable[..., Process], drive: Path, tmp_path: Path
+) -> None:
+    link = tmp_path / "out"
+    link.symlink_to(tmp_path / "away" / "out")
+    results = cli(*arguments(drive, link)), run(*arguments(drive, link))
+    assert (results[0].returncode, results[1].exit_code) == (2, 2)
+    assert link.is_symlink()
+
+
 def test_a_journal_of_many_frames(cli: Callable[..., Process], drive: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.mkv"
     assert cli(*arguments(drive, out)).returncode == 0

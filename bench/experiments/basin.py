@@ -1,6 +1,7 @@
 """Experiment 7: from how far off is a rig found? Beside ECC and MI a pair, and the paper's Adam.
 
-Parts: `displacement` (ratio of fields of view by displacement), `frames` (frames by roll).
+Parts: `displacement` (ratio of fields of view by displacement), `limits` (the same for ours alone,
+farther), `frames` (frames by roll).
 """
 
 from collections.abc import Callable
@@ -81,6 +82,7 @@ OTHERS = {
     "MI affine, a pair": a_pair(mutual_information.affine),
 }
 RATIOS, SHIFTS = (0.6, 0.8, 1.0, 1.25, 1.67), (0.0, 0.05, 0.1, 0.2, 0.3)
+FAR_RATIOS, FAR_SHIFTS = (0.4, 0.5, 0.6, 1.0, 1.67, 2.0, 2.5), (0.0, 0.2, 0.3, 0.4, 0.5)
 ROLLS, FRAMES = (0.0, 5.0, 10.0, 20.0), (1, 2, 4, 8)
 
 
@@ -112,9 +114,10 @@ class Grid:
             done[i, j] += 1
             told = (f"{v[i, j]:.0f}" for v in found.values())
             print(seed, self.rows[i], self.columns[j], *told, "of", done[i, j], flush=True)
+        if not done.all():
+            raise SystemExit("time was up before every cell had a rig; expected more --minutes")
         rigs = " to ".join(str(n) for n in sorted({done.min(), done.max()}))
-        with np.errstate(invalid="ignore"):
-            return {label: v / done for label, v in found.items()}, rigs
+        return {label: v / done for label, v in found.items()}, rigs
 
     def write(self, results: Results, name: str, found: dict[str, np.ndarray], note: str) -> None:
         """Tables of the methods, one below the other, and heat maps, side by side."""
@@ -125,17 +128,13 @@ class Grid:
                 *(f"{v:g}{self.column_unit}" for v in self.columns),
             ],
             [
-                [f"{label}, {of:g}", *(self.share(v) for v in row)]
+                [f"{label}, {of:g}", *(f"{v:.0%}" for v in row)]
                 for label, values in found.items()
                 for of, row in zip(self.rows, values, strict=True)
             ],
             note,
         )
-        results.plot(name, lambda figure: self.heat(figure, found), (2.4 * len(found), 3))
-
-    @staticmethod
-    def share(value: float) -> str:
-        return f"{value:.0%}" if np.isfinite(value) else "-"
+        results.plot(name, lambda figure: self.heat(figure, found), (max(3, 2.4 * len(found)), 3))
 
     def heat(self, figure, found: dict[str, np.ndarray]) -> None:
         all_axes = figure.subplots(1, len(found), squeeze=False)[0]
@@ -147,15 +146,22 @@ class Grid:
             axes.set_yticks(range(len(self.rows)), [f"{v:g}" for v in self.rows], size=8)
             for (row, column), value in np.ndenumerate(values):
                 shade = "k" if value > 0.6 else "w"
-                text = self.share(value)
-                axes.text(column, row, text, ha="center", va="center", color=shade, size=7)
+                axes.text(
+                    column, row, f"{value:.0%}", ha="center", va="center", color=shade, size=7
+                )
         all_axes[0].set_ylabel(self.row_label, size=8)
 
 
-def displacement(results: Results) -> None:
+def displacement(
+    results: Results,
+    name: str,
+    ratios: tuple[float, ...],
+    shifts: tuple[float, ...],
+    methods: dict[str, Method],
+) -> None:
     grid = Grid(
-        results.of(RATIOS, RATIOS[2:3]), "ratio of fields of view",
-        results.of(SHIFTS, SHIFTS[1:2]), "displacement", " w",
+        results.of(ratios, ratios[2:3]), "ratio of fields of view",
+        results.of(shifts, shifts[1:2]), "displacement", " w",
     )  # fmt: skip
 
     def scene_of(seed: int, i: int, j: int) -> tuple[Rendered, int]:
@@ -164,11 +170,10 @@ def displacement(results: Results) -> None:
         rig = rig_of(grid.rows[i], grid.columns[j], roll, angle)
         return rendered(rig, 4, 100 + seed), 4
 
-    methods = OURS | results.of(OTHERS, {})
     found, rigs = grid.explore(results, methods, results.of(3, 1), scene_of)
     grid.write(
         results,
-        "displacement",
+        name,
         found,
         f"Rendered rigs of 320x240, {rigs} in each cell, 4 frames, baseline {BASELINE:g} m, roll"
         f" within 2 deg; found: median end-point error under {LIMIT:g} px. Ratio of tangents,"
@@ -200,6 +205,9 @@ def frames(results: Results) -> None:
 
 def run(results: Results, part: str | None) -> None:
     if part in (None, "displacement"):
-        displacement(results)
+        methods = OURS | results.of(OTHERS, {})
+        displacement(results, "displacement", RATIOS, SHIFTS, methods)
+    if part in (None, "limits"):
+        displacement(results, "limits", FAR_RATIOS, FAR_SHIFTS, OURS)
     if part in (None, "frames"):
         frames(results)

@@ -100,7 +100,7 @@ def run(results: Results, part: str | None) -> None:
     changes = dict(list(CHANGES.items())[: results.of(None, 2)])
     found = {label: [] for label in changes}
     for seed, scene in enumerate(
-        results.in_time(random_rigs(results.of(6, 1), 4, results.quick, **NEAR))
+        results.in_time(random_rigs(results.of(12, 1), 4, results.quick, **NEAR))
     ):
         for label, change in changes.items():
             rng = np.random.default_rng(seed)

@@ -69,6 +69,14 @@ std::string differences(const Json& before, const Json& now) {
     return text;
 }
 
+// Whether the open file is what stands at the path now.
+bool is_file_at(int descriptor, const Path& path) {
+    struct stat open {
+    }, there{};
+    return fstat(descriptor, &open) == 0 && stat(path.c_str(), &there) == 0 &&
+           open.st_dev == there.st_dev && open.st_ino == there.st_ino;
+}
+
 }  // namespace
 
 Journal::Journal(Path path, const MadeWith& made_with, bool overwrite) : path_(std::move(path)) {
@@ -89,11 +97,12 @@ Journal::~Journal() { close(); }
 void Journal::close() {
     std::error_code ignored;
     if (descriptor_ >= 0) {
-        if (lseek(descriptor_, 0, SEEK_END) == 0) fs::remove(path_, ignored);
+        if (lseek(descriptor_, 0, SEEK_END) == 0 && is_file_at(descriptor_, path_))
+            fs::remove(path_, ignored);
         ::close(descriptor_);
         descriptor_ = -1;
     }
-    for (const Path& folder : made_folders_) fs::remove(folder, ignored);  // if it is empty
+    for (const Path& folder : made_folders_) ::rmdir(folder.c_str());  // if it is an empty folder
 }
 
 void Journal::append(std::vector<std::pair<std::string, long>> frames,
@@ -124,8 +133,7 @@ void Journal::open() {
             ::close(file);
             throw InputError(path_.string() + ": another run is writing to this output");
         }
-        struct stat state {};
-        if (fstat(file, &state) == 0 && state.st_nlink > 0) descriptor_ = file;
+        if (is_file_at(file, path_)) descriptor_ = file;
         else ::close(file);  // removed by the run that held it
     }
 }

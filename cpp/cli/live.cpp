@@ -38,10 +38,7 @@ Totals register_live(const RegisterArguments& a, const Rig& rig, Console& consol
     const DepthPointer plane = plane_depth(a.frames.depth.plane);
     // The cameras are there: what another run wrote may go now.
     const Path journal = journal_of(a.output);
-    if (std::filesystem::exists(journal)) {
-        { const Journal removed(journal, {}, true); }
-        std::filesystem::remove(journal);
-    }
+    if (std::filesystem::exists(journal)) Journal(journal, {}, true);
     const std::unique_ptr<Sink> sink = open_sink(a.output, a.rate, nullptr);
     sink->begin({});
     std::vector<FrameName> names;

@@ -34,7 +34,9 @@ void run(RegisterArguments a, Console& console) {
     if (a.live) {
         check_output(a);
         // What a camera shows is not to be had again: there is nothing to go on with.
-        if (!a.overwrite && std::filesystem::exists(journal_of(a.output)))
+        std::error_code none;
+        const auto noted = std::filesystem::file_size(journal_of(a.output), none);
+        if (!a.overwrite && !none && noted > 0)
             throw InputError(a.output +
                              " holds another run's frames, expected another output, or"
                              " --overwrite");

@@ -533,9 +533,9 @@ A rig that was calibrated with it has its translation in the unit that the scale
                       "Median distance between fits to two halves of the frames [working px].")
         .def_readonly(
             "visible_shift_px", &CalibrationReport::visible_shift_px,
-            "Length of the shift, linear over the image, that flow between the registered\n"
-            "images still sees, at most in 90 % of the pixels [working px]; NaN where it\n"
-            "cannot tell.")
+            "Of the shift, linear over the image, that flow between the registered images\n"
+            "still sees: the length that 90 % of the pixels do not exceed [working px];\n"
+            "NaN where it cannot tell.")
         .def_readonly("valid_share", &CalibrationReport::valid_share,
                       "Of the reference's edge energy.")
         .def_readonly("frames", &CalibrationReport::frames, "Indices of the pairs used.")

@@ -15,6 +15,8 @@ namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
 
+static_assert(hn::MaxLanes(FloatTag()) <= kShiftsAtOnce);
+
 constexpr int kKinds = 4;  // of sums: a . b, |a|^2 m, |b|^2 m, both weights
 
 // Sums over one cell at as many shifts as kVectors vectors have lanes; of each kind `pitch` floats.

@@ -108,7 +108,11 @@ double best_shift(const WorkingImages& all_images, const CalibrationOptions& opt
                   double farthest, Rig& rig) {
     // What a shift leaves, once the rig is solved anew, is seen at full size only.
     constexpr std::size_t kFrames = 8;
-    const WorkingImages images = all_images.spread(kFrames);
+    WorkingImages images = all_images.spread(kFrames);
+    // Without the edges of the depth as given: all shifts compare the same pixels.
+    if (images.parts.depth_edges)
+        for (Image& depth : images.pyramid.at(1).depths) depth = without_depth_edges(depth);
+    images.parts.depth_edges = false;
     CalibrationOptions quick = options;
     quick.max_iterations = std::min(options.max_iterations, 12);
     const Level start = make_level(images, 1, rig, options.num_threads);

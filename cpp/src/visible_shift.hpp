@@ -5,9 +5,10 @@
 
 namespace xcalib {
 
-// The length of the shift [working px] that varies linearly over the image, which 90 % of what the
-// source sees is below: what a wrong rig leaves varies so, roughly, and what flow mistakes does
-// not. NaN where flow can tell of too few places. The built-in flow, over up to 4 of the pairs.
+// Of the shift that varies linearly over the image: the length that 90 % of the pixels do not
+// exceed [working px]. What a wrong rig leaves varies so, roughly, and what flow mistakes does not.
+// NaN where flow can tell of too little of what the source sees. The built-in flow, on up to 4
+// pairs.
 double visible_shift(const WorkingImages& images, const Rig& rig, int num_threads);
 
 }  // namespace xcalib

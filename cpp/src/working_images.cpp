@@ -47,10 +47,28 @@ void for_frame(const char* name, int index, const Work& work) {
     }
 }
 
-// Depth without its edges, for the NEC of the finer levels (at coarser ones nearly everything is
-// near an edge, and a pixel's width matters less; a patch of the flow is wider): across one, the
-// warp shows a surface beside another that the source camera may not see there at all, and the step
-// between them moves with the depth, not the rig.
+float floor_of(const Parts& parts) { return parts.floor ? kEdgeFloor : 0.0f; }
+
+}  // namespace
+
+void validate_frames(const std::vector<ImageView>& references,
+                     const std::vector<ImageView>& sources, const std::vector<ImageView>& depths) {
+    if (references.empty())
+        throw std::invalid_argument("no image pairs were given, expected at least 1");
+    if (references.size() != sources.size() || references.size() != depths.size())
+        throw std::invalid_argument("got " + std::to_string(references.size()) + " references, " +
+                                    std::to_string(sources.size()) + " sources and " +
+                                    std::to_string(depths.size()) +
+                                    " depth maps, expected as many of each");
+    require_one_size("reference", references);
+    require_one_size("source", sources);
+    for (std::size_t i = 0; i < depths.size(); ++i)
+        for_frame("depth", static_cast<int>(i), [&] {
+            require_same_aspect("size", depths[i].width, depths[i].height, references[0].width,
+                                references[0].height);
+        });
+}
+
 Image without_depth_edges(const Image& depth) {
     constexpr float kEdge = 1.1f, kFar = std::numeric_limits<float>::max();
     const int width = depth.width;
@@ -75,28 +93,6 @@ Image without_depth_edges(const Image& depth) {
         }
     }
     return out;
-}
-
-float floor_of(const Parts& parts) { return parts.floor ? kEdgeFloor : 0.0f; }
-
-}  // namespace
-
-void validate_frames(const std::vector<ImageView>& references,
-                     const std::vector<ImageView>& sources, const std::vector<ImageView>& depths) {
-    if (references.empty())
-        throw std::invalid_argument("no image pairs were given, expected at least 1");
-    if (references.size() != sources.size() || references.size() != depths.size())
-        throw std::invalid_argument("got " + std::to_string(references.size()) + " references, " +
-                                    std::to_string(sources.size()) + " sources and " +
-                                    std::to_string(depths.size()) +
-                                    " depth maps, expected as many of each");
-    require_one_size("reference", references);
-    require_one_size("source", sources);
-    for (std::size_t i = 0; i < depths.size(); ++i)
-        for_frame("depth", static_cast<int>(i), [&] {
-            require_same_aspect("size", depths[i].width, depths[i].height, references[0].width,
-                                references[0].height);
-        });
 }
 
 WorkingImages make_working_images(const std::vector<ImageView>& references,
@@ -232,14 +228,14 @@ Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, in
     // Where the reference is finer than its partner, it is blurred to match.
     const double reference_blur = kBlur * std::max(1.0, 1 / density);
     const Rig at_level = level.rig_at(rig);
-    const bool edges = factor >= kCoarse || !images.parts.depth_edges;
+    const bool whole = factor >= kCoarse || !images.parts.depth_edges;
     fill(level, images, rig, num_threads, [&](int i) {
         const Image& depth = reduced.depths[i];
         return std::make_unique<NecPair>(make_nec_frame(
             gaussian_blur(reduced.references[i], reference_blur),
             gaussian_blur(resize_area(images.sources[i], level.source_width, level.source_height),
                           kBlur),
-            edges ? depth : without_depth_edges(depth), at_level, floor_of(images.parts)));
+            whole ? depth : without_depth_edges(depth), at_level, floor_of(images.parts)));
     });
     return level;
 }

@@ -46,6 +46,12 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<int>& chosen,
                                   const CalibrationOptions& options);
 
+// Depth without its edges, for the NEC of the finer levels (at coarser ones nearly everything is
+// near an edge, and a pixel's width matters less; a patch of the flow is wider): across one, the
+// warp shows a surface beside another that the source camera may not see there at all, and the step
+// between them moves with the depth, not the rig.
+Image without_depth_edges(const Image& depth);
+
 // One level of the pyramid, made for the scale between the cameras that `rig` has.
 struct Level {
     int factor = 1;

@@ -325,9 +325,9 @@ class CalibrationReport:
         """Median distance between fits to two halves of the frames [working px]."""
     @property
     def visible_shift_px(self) -> float:
-        """Length of the shift, linear over the image, that flow between the registered
-        images still sees, at most in 90 % of the pixels [working px]; NaN where it
-        cannot tell."""
+        """Of the shift, linear over the image, that flow between the registered images
+        still sees: the length that 90 % of the pixels do not exceed [working px];
+        NaN where it cannot tell."""
     @property
     def valid_share(self) -> float:
         """Of the reference's edge energy."""

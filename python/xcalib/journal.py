@@ -82,8 +82,9 @@ class Journal:
     def close(self) -> None:
         """Let another process have it."""
         if self._descriptor >= 0:
-            if os.fstat(self._descriptor).st_size == 0:
-                self.path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                if os.fstat(self._descriptor).st_size == 0 and _is_at(self._descriptor, self.path):
+                    self.path.unlink()
             os.close(self._descriptor)
             self._descriptor = -1
         for folder in self._made_folders:
@@ -121,7 +122,7 @@ class Journal:
             except OSError:
                 os.close(descriptor)
                 raise InputError(f"{self.path}: another run is writing to this output") from None
-            if os.fstat(descriptor).st_nlink > 0:
+            if _is_at(descriptor, self.path):
                 self._descriptor = descriptor
                 return
             os.close(descriptor)  # removed by the run that held it
@@ -170,6 +171,14 @@ class Journal:
         if len(whole) < len(data):
             os.ftruncate(self._descriptor, len(whole))
         self.units = [unit for unit in units if self.is_whole(unit)]
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    """Whether the open file is what stands at the path now."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), os.stat(path))
+    except FileNotFoundError:
+        return False
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:

@@ -26,7 +26,7 @@ struct Planes {
             x.push_back(any ? edge(random) : 0.0f);
             y.push_back(any ? edge(random) : 0.0f);
             square.push_back(x.back() * x.back() + y.back() * y.back());
-            weight.push_back(valid ? 1.0f : 0.0f);
+            weight.push_back(valid ? 0.5f + 0.5f * share(random) : 0.0f);
         }
     }
 
@@ -61,10 +61,10 @@ double correlation(const Planes& a, const Planes& b, const PatchGrid& grid, int 
 }
 
 TEST(CorrelatePatches, AreWhatTheirDefinitionSays) {
-    const std::vector<float> profile{0.25f, 0.5f, 0.25f};
-    for (const int shifts : {1, 5, 16, 17, 51}) {
+    const std::vector<float> several{0.25f, 0.5f, 0.25f}, one{1.0f};
+    for (const auto& [shifts, cells] : {std::pair{1, 3}, {5, 3}, {16, 1}, {17, 3}, {51, 1}}) {
         SCOPED_TRACE(shifts);
-        const PatchGrid grid{6, 5, 5, profile.data(), 3};
+        const PatchGrid grid{6, 5, 5, (cells == 1 ? one : several).data(), cells};
         const int pitch = (shifts + kShiftsAtOnce - 1) / kShiftsAtOnce * kShiftsAtOnce;
         const Planes a(grid.width * grid.step + 3, grid.height * grid.step + 1, 1);
         const Planes b(grid.width * grid.step + pitch, grid.height * grid.step, 2);

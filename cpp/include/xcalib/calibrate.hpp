@@ -63,7 +63,7 @@ struct Parts {
     bool floor = true;          // of the objective's edges; off: they count however weak
     bool pair_weights = true;   // c_i; off: every pair counts alike
     bool normalization = true;  // photometric; off: gray values as given
-    bool depth_edges = true;    // are left out at the finer levels; off: they are not
+    bool depth_edges = true;    // are left out of the NEC at the finer levels; off: not
 };
 
 struct CalibrationOptions {
