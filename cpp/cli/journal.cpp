@@ -71,10 +71,9 @@ std::string differences(const Json& before, const Json& now) {
 
 // Whether the open file is what stands at the path now.
 bool is_file_at(int descriptor, const Path& path) {
-    struct stat open {
-    }, there{};
-    return fstat(descriptor, &open) == 0 && stat(path.c_str(), &there) == 0 &&
-           open.st_dev == there.st_dev && open.st_ino == there.st_ino;
+    struct stat ours, there;
+    return fstat(descriptor, &ours) == 0 && stat(path.c_str(), &there) == 0 &&
+           ours.st_dev == there.st_dev && ours.st_ino == there.st_ino;
 }
 
 }  // namespace
