@@ -69,7 +69,7 @@ HWY_INLINE void weigh(const float* of, std::size_t stride, const float* weights,
 void correlate_patches_here(const EdgeRows& a, const EdgeRows& b, const PatchGrid& grid, int shifts,
                             float* score) {
     const FloatTag d;
-    const int pitch = (shifts + kShiftsAtOnce - 1) / kShiftsAtOnce * kShiftsAtOnce;
+    const int pitch = rounded_up(shifts);
     const int reach = grid.cells / 2, step = grid.step;
     const std::size_t cell = static_cast<std::size_t>(kKinds) * pitch, row = cell * grid.width;
     // Empty cells around the grid are what a patch has beyond the image.

@@ -24,6 +24,9 @@ constexpr float kNoCorrelation = -2.0f;
 
 // Scores and what is read of an image beyond the last shift go to a multiple of so many.
 constexpr int kShiftsAtOnce = 16;
+constexpr int rounded_up(int shifts) {
+    return (shifts + kShiftsAtOnce - 1) / kShiftsAtOnce * kShiftsAtOnce;
+}
 
 // For every patch of `a` and each of `shifts` shifts of `b` to the right, over the pixels that both
 // images have:

@@ -179,7 +179,7 @@ std::vector<float> patch_profile(int cells) {
 Volume correlate(const Edges& a, const Edges& b, int radius, const FlowOptions& options,
                  int num_threads) {
     const int side = 2 * radius + 1;
-    const int pitch = (side + kShiftsAtOnce - 1) / kShiftsAtOnce * kShiftsAtOnce;
+    const int pitch = rounded_up(side);
     const std::vector<float> profile = patch_profile(options.patch / options.step);
     const PatchGrid grid{a.size().width / options.step, a.size().height / options.step,
                          options.step, profile.data(), static_cast<int>(profile.size())};

@@ -65,7 +65,7 @@ TEST(CorrelatePatches, AreWhatTheirDefinitionSays) {
     for (const auto& [shifts, cells] : {std::pair{1, 3}, {5, 3}, {16, 1}, {17, 3}, {51, 1}}) {
         SCOPED_TRACE(shifts);
         const PatchGrid grid{6, 5, 5, (cells == 1 ? one : several).data(), cells};
-        const int pitch = (shifts + kShiftsAtOnce - 1) / kShiftsAtOnce * kShiftsAtOnce;
+        const int pitch = rounded_up(shifts);
         const Planes a(grid.width * grid.step + 3, grid.height * grid.step + 1, 1);
         const Planes b(grid.width * grid.step + pitch, grid.height * grid.step, 2);
         std::vector<float> score(static_cast<std::size_t>(grid.width) * grid.height * pitch);

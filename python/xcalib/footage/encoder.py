@@ -15,6 +15,7 @@ from typing import Any
 
 import av
 import numpy as np
+from av import library_versions
 
 from ..frames import Image, InputError, size_of
 
@@ -36,7 +37,7 @@ _LOSSLESS = {"gray": "gray", "gray16le": "gray16le", "bgr24": "bgr0"}
 
 def encoder_name() -> str:
     """The library that compresses, and its version: parts of a video are of one."""
-    return f"libavcodec {'.'.join(map(str, av.library_versions['libavcodec']))}"
+    return f"libavcodec {'.'.join(map(str, library_versions['libavcodec']))}"
 
 
 def check_image(path: Path, image: Image) -> None:
