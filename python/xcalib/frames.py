@@ -11,7 +11,6 @@ Nothing half-written: a file appears under its name only when it is complete.
 from __future__ import annotations
 
 import contextlib
-import os
 import tempfile
 import threading
 from collections.abc import Collection, Iterator, Sequence
@@ -23,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core import InputError, Rig, display_gray, natural_order, overlay, pair_files
+from .whole_file import WholeFile
 
 Image = NDArray[Any]
 Size = tuple[int, int]
@@ -226,15 +226,12 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file whole or not at all, and make its folder."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        partial.write_bytes(data)
-        os.replace(partial, path)
+        with WholeFile(path) as partial:
+            partial.write_bytes(data)
     except OSError as error:
-        # A full disk names no file, and nobody knows ours.
+        # A full disk names no file, and the user does not know the partial one.
         raise OSError(error.errno, error.strerror, str(path)) from None
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def write_image(path: str | Path, image: Image) -> None:

@@ -20,6 +20,7 @@ from urllib.parse import unquote, urlsplit
 from .cache import file_hash
 from .depth.recipes import RECIPES
 from .frames import InputError, write_bytes
+from .whole_file import WholeFile
 
 CHUNK = 1 << 20
 TIMEOUT = 30
@@ -110,18 +111,20 @@ def fetch(
         return path
 
     folder.mkdir(parents=True, exist_ok=True)
-    partial = folder / f".{name}.partial"
+    # Not discarded where the transfer fails: the next one resumes it.
+    file = WholeFile(path, folder / f".{name}.partial")
+    partial = file.partial
     _transfer(url, partial, show)
     found = file_hash(partial)
     if known_hash is not None and found != known_hash:
-        partial.unlink()
+        file.discard()
         raise InputError(
             f"{url}: sha256 is {found}, expected {known_hash} as when it was first fetched"
         )
     index[name] = {"url": url, "sha256": found, "bytes": partial.stat().st_size}
     document = {"format": "xcalib-models", "version": 1, "files": index}
     write_bytes(folder / "index.json", (json.dumps(document, indent=2) + "\n").encode())
-    os.replace(partial, path)
+    file.keep()
     return path
 
 

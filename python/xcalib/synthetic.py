@@ -32,6 +32,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from xcalib import _street
 from xcalib._core import Pinhole, Rig
+from xcalib.frames import write_bytes
 
 Array = NDArray[Any]
 
@@ -828,7 +829,7 @@ def write(folder: str | os.PathLike[str], frames: Iterable[Frame], rig: Rig | No
         }
         for kind, image in layers.items():
             _require(image.dtype in (np.uint8, np.uint16), kind, image.dtype, "uint8 or uint16")
-            _write_whole(root / kind / f"{frame.name}.png", _png(image))
+            write_bytes(root / kind / f"{frame.name}.png", _png(image))
     if rig is not None:
         rig.save(root / "rig.yaml")
 
@@ -845,15 +846,6 @@ def _png(image: Array) -> bytes:
     if not done:
         raise ValueError(f"cannot encode an image of shape {image.shape}, {image.dtype} as PNG")
     return data.tobytes()
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        partial.write_bytes(data)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _require(condition: Any, name: str, value: Any, expected: str) -> None:
