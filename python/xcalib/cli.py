@@ -11,7 +11,8 @@ import itertools
 import json
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn
@@ -21,10 +22,11 @@ import click
 from ._core import CalibrationOptions, Pinhole, Rig
 from .cli_options import options
 from .demo import run_demo
+from .depth import MeasuredDepth, NetworkOptions, PlaneDepth
 from .depth.options import DEPTH_OPTIONS
 from .evaluate import as_document, evaluate
 from .flow import FlowProvider, NetworkFlow
-from .footage import camera_infos, is_bag, is_video
+from .footage import Matching, camera_infos, is_bag, is_video
 from .footage.options import FOOTAGE_OPTIONS
 from .frames import (
     Image,
@@ -34,6 +36,7 @@ from .frames import (
     size_of,
     write_bytes,
 )
+from .inputs import Inputs
 from .inspection import describe, facts_text
 from .models_command import models
 from .pipeline import (
@@ -122,9 +125,31 @@ frames_arguments = options(
 )
 
 
-def open_frames(inputs: dict[str, Any], threads: int, rig: Rig | None) -> Frames:
+def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
+    """The values of `frames_arguments`, by the names of the command's parameters."""
+    of = arguments.__getitem__
+    return Inputs(
+        of("reference"),
+        of("source"),
+        of("depth_spec"),
+        of("depth_scale"),
+        Matching(
+            *map(of, ("pairing", "time_offset", "max_gap", "reference_times", "source_times"))
+        ),
+        PlaneDepth(*map(of, ("camera_height", "horizon", "far", "plane_hfov", "plane_roll"))),
+        NetworkOptions(
+            *map(
+                of, ("depth_recipe", "depth_focal", "inverse_scale", "inverse_shift", "providers")
+            ),
+            num_threads=threads,
+        ),
+        MeasuredDepth(**{field.name: of(field.name) for field in fields(MeasuredDepth)}),
+    )
+
+
+def open_frames(arguments: Mapping[str, Any], threads: int, rig: Rig | None) -> Frames:
     """Open what `frames_arguments` names, and say how frames were paired by time."""
-    frames = Frames.open(threads=threads, rig=rig, **inputs)
+    frames = Frames.open(inputs_of(arguments, threads), rig)
     for note in frames.notes:
         click.echo(note, err=True)
     return frames

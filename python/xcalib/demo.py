@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from . import synthetic
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig
 from .frames import Image, check_folder_writable, display_gray, overlay, size_of, write_image
+from .inputs import Inputs
 from .pipeline import Frames, progress, run_calibration, save_rig
 from .registration import RegistrationOptions, run_registration
 
@@ -41,7 +42,7 @@ def run_demo(
     rendered = synthetic.render(truth, num_frames=num_frames, seed=seed, night=night)
     synthetic.write(data, progress(rendered, num_frames, "rendering", quiet), truth)
 
-    everything = Frames.open(data / "visible", data / "thermal", str(data / "depth"))
+    everything = Frames.open(Inputs(data / "visible", data / "thermal", data / "depth"))
     # An earlier and longer demo may have left frames behind these.
     references, sources = everything.references[:num_frames], everything.sources[:num_frames]
     frames = Frames(references, sources, everything.depth)

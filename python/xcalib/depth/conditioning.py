@@ -6,17 +6,18 @@ from dataclasses import dataclass, field
 
 from .._core import DepthSteadier
 from ..frames import Image
-from .provider import Depth, DepthProvider
+from .provider import Depth, WrappedDepth
 
 
-@dataclass
-class SteadyDepth:
+@dataclass(frozen=True)
+class SteadyDepth(WrappedDepth):
     """Depth of another provider, averaged over time along the image flow, see `DepthSteadier`.
 
     Call it with consecutive frames. Any other frame starts it anew and passes as it is.
     """
 
-    provider: DepthProvider
+    is_parallel = False
+    is_steady = True
     _steadier: DepthSteadier = field(default_factory=DepthSteadier, init=False)
 
     def __call__(self, index: int, reference: Image) -> Depth:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..frames import Image, InputError, gray, list_files, pair, read_image, size_of
 from ..yaml_file import load_yaml
-from .provider import Depth
+from .provider import Depth, DepthProvider
 
 BLOCK = 5
 """Side of the matched blocks [px]."""
@@ -118,10 +118,10 @@ def _matched(
     return found
 
 
-class StereoDepth:
+class StereoDepth(DepthProvider):
     """Depth from a folder of the partner's images, paired with the references by `frames.pair`."""
 
-    parallel = True
+    is_parallel = True
 
     def __init__(
         self,
@@ -151,3 +151,6 @@ class StereoDepth:
                 " rectified pair"
             )
         return depth
+
+    def files_of(self, index: int) -> list[Path]:
+        return [self.paths[index]]
