@@ -127,23 +127,25 @@ frames_arguments = options(
 
 def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
     """The values of `frames_arguments`, by the names of the command's parameters."""
-    of = arguments.__getitem__
+    a = arguments
     return Inputs(
-        of("reference"),
-        of("source"),
-        of("depth_spec"),
-        of("depth_scale"),
+        a["reference"],
+        a["source"],
+        a["depth_spec"],
+        a["depth_scale"],
         Matching(
-            *map(of, ("pairing", "time_offset", "max_gap", "reference_times", "source_times"))
+            a["pairing"], a["time_offset"], a["max_gap"], a["reference_times"], a["source_times"]
         ),
-        PlaneDepth(*map(of, ("camera_height", "horizon", "far", "plane_hfov", "plane_roll"))),
+        PlaneDepth(a["camera_height"], a["horizon"], a["far"], a["plane_hfov"], a["plane_roll"]),
         NetworkOptions(
-            *map(
-                of, ("depth_recipe", "depth_focal", "inverse_scale", "inverse_shift", "providers")
-            ),
-            num_threads=threads,
+            a["depth_recipe"],
+            a["depth_focal"],
+            a["inverse_scale"],
+            a["inverse_shift"],
+            a["providers"],
+            threads,
         ),
-        MeasuredDepth(**{field.name: of(field.name) for field in fields(MeasuredDepth)}),
+        MeasuredDepth(**{field.name: a[field.name] for field in fields(MeasuredDepth)}),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from .depth import PNG_SCALE, MeasuredDepth, NetworkOptions, PlaneDepth
@@ -20,11 +20,11 @@ class Inputs:
     """A ``--depth`` argument, see `depth.open_depth`."""
     depth_scale: float = PNG_SCALE
     """Metres per count of 16-bit PNG depth."""
-    matching: Matching = Matching()
+    matching: Matching = field(default_factory=Matching)
     """Which frames of the two belong together."""
-    plane: PlaneDepth = PlaneDepth()
+    plane: PlaneDepth = field(default_factory=PlaneDepth)
     """The road, where depth is ``plane``."""
-    network: NetworkOptions = NetworkOptions()
+    network: NetworkOptions = field(default_factory=NetworkOptions)
     """How to run it, where depth is a network."""
-    measured: MeasuredDepth = MeasuredDepth()
+    measured: MeasuredDepth = field(default_factory=MeasuredDepth)
     """Lidar and stereo; completion and averaging over time of any depth."""
