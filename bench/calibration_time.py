@@ -25,7 +25,7 @@ from figures import figure, skipped, spread
 from night import NightRig
 
 import xcalib
-from xcalib import synthetic
+from xcalib import metrics, synthetic
 
 CACHE = ROOT / "build" / "bench"
 THREADS = 2
@@ -224,7 +224,7 @@ def against_peer(name: str, folder: Path, truth: xcalib.Rig | None, rounds: int)
     if truth is None:
         return
     for who, rig in rigs.items():
-        maps = [synthetic.end_point_error(rig, truth, depth) for depth in sets[2]]
+        maps = [metrics.end_point_error(rig, truth, depth) for depth in sets[2]]
         figure(f"{name}: end-point error, {who}", float(np.nanmedian(np.stack(maps))), "px")
 
 

@@ -44,9 +44,9 @@ def machine() -> str:
 
 def median_error(found, truth, depths) -> float:
     """Median end-point error [source px] over all frames."""
-    from xcalib import synthetic
+    from xcalib import metrics
 
     errors = np.concatenate(
-        [synthetic.end_point_error(found, truth, depth).ravel() for depth in depths]
+        [metrics.end_point_error(found, truth, depth).ravel() for depth in depths]
     )
     return float(np.nanmedian(errors))

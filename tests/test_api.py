@@ -14,7 +14,16 @@ import pytest
 from numpy.typing import NDArray
 
 import xcalib
-from xcalib import CalibrationOptions, Pinhole, Registrar, Rig, SearchOptions, _core, synthetic
+from xcalib import (
+    CalibrationOptions,
+    Pinhole,
+    Registrar,
+    Rig,
+    SearchOptions,
+    _core,
+    metrics,
+    synthetic,
+)
 
 Array = NDArray[Any]
 WIDTH, HEIGHT, FRAMES = 320, 240, 6
@@ -617,7 +626,7 @@ def result(
 def test_a_rendered_rig_is_found(
     result: xcalib.CalibrationResult, truth: Rig, frames: list[synthetic.Frame]
 ) -> None:
-    errors = [synthetic.end_point_error(result.rig, truth, frame.depth) for frame in frames]
+    errors = [metrics.end_point_error(result.rig, truth, frame.depth) for frame in frames]
     assert np.nanmedian(errors) < 0.5
     assert result.converged and result.report.converged
 
@@ -698,7 +707,7 @@ def test_a_good_initial_rig_is_refined_without_a_search(
     options = CalibrationOptions(search=SearchOptions(mode="off"))
     result = xcalib.calibrate(*lists_of(frames), initial=start, options=options)
     errors, before = (
-        [synthetic.end_point_error(rig, truth, frame.depth) for frame in frames]
+        [metrics.end_point_error(rig, truth, frame.depth) for frame in frames]
         for rig in (result.rig, start)
     )
     assert np.nanmedian(before) > 1
@@ -713,7 +722,7 @@ def test_a_wrong_initial_translation_is_not_kept(
     start = Rig(truth.reference, truth.source, truth.R, truth.t + off)
     result = xcalib.calibrate(*lists_of(frames[:2]), initial=start)
     errors, before = (
-        [synthetic.end_point_error(rig, truth, frame.depth) for frame in frames[:2]]
+        [metrics.end_point_error(rig, truth, frame.depth) for frame in frames[:2]]
         for rig in (result.rig, start)
     )
     assert np.nanmedian(before) > 10

@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 
 import xcalib
 from conftest import run
-from xcalib import AdamOptions, CalibrationOptions, Pinhole, Rig, SearchOptions, _core, synthetic
+from xcalib import (
+    AdamOptions,
+    CalibrationOptions,
+    Pinhole,
+    Rig,
+    SearchOptions,
+    _core,
+    metrics,
+    synthetic,
+)
 
 Floats = NDArray[np.float32]
 
@@ -41,7 +50,7 @@ def calibrate(frames: list[synthetic.Frame], provider: Any = None, **options: An
 
 
 def error(rig: Rig, truth: Rig, frames: list[synthetic.Frame]) -> float:
-    maps = [synthetic.end_point_error(rig, truth, frame.depth) for frame in frames]
+    maps = [metrics.end_point_error(rig, truth, frame.depth) for frame in frames]
     return float(np.nanmedian(np.stack(maps)))
 
 

@@ -11,7 +11,7 @@ from common import ROOT
 from night import SIZE, NightRig, gray
 
 import xcalib
-from xcalib import _street, synthetic
+from xcalib import metrics, synthetic
 
 CACHE = ROOT / "build" / "rendered"
 WIDTH, HEIGHT, SOURCE_WIDTH, SOURCE_HEIGHT = 320, 240, 320, 256
@@ -38,7 +38,7 @@ class Rendered:
     def error(self, rig: xcalib.Rig, frames=slice(None)) -> float:
         """Median end-point error over the frames [px of the source]."""
         return float(
-            np.nanmedian([synthetic.end_point_error(rig, self.rig, d) for d in self.depths[frames]])
+            np.nanmedian([metrics.end_point_error(rig, self.rig, d) for d in self.depths[frames]])
         )
 
 
@@ -47,8 +47,8 @@ def rendered(rig: xcalib.Rig, frames: int, seed: int, night: bool = False) -> Re
     key = hashlib.sha256(
         f"{rig!r} {rig.R.tolist()} {rig.t.tolist()} {frames} {seed} {night}".encode()
     )
-    for module in (synthetic, _street):
-        key.update(Path(module.__file__).read_bytes())
+    for source in sorted(Path(synthetic.__file__).parent.glob("*.py")):
+        key.update(source.read_bytes())
     kept = CACHE / f"{key.hexdigest()[:24]}.npz"
     if not kept.exists():
         street = list(synthetic.render(rig, num_frames=frames, seed=seed, night=night))

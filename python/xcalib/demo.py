@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from . import synthetic
+from . import metrics, synthetic
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig
 from .frames import Image, check_folder_writable, display_gray, overlay, size_of, write_image
 from .inputs import Inputs
@@ -68,7 +68,7 @@ def against_truth(rig: Rig, truth: Rig, frames: Frames) -> str:
     for index in range(len(frames)):
         reference, _, depth = frames.read(index)
         if size_of(depth) == size_of(reference):
-            error = synthetic.end_point_error(rig, truth, depth)
+            error = metrics.end_point_error(rig, truth, depth)
             errors.append(error[np.isfinite(error)])
     pixels = np.concatenate(errors)
     median, high = np.percentile(pixels, (50, 95)) if pixels.size else (math.nan, math.nan)
