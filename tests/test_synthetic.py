@@ -178,6 +178,18 @@ def test_occluded_means_something_nearer_is_in_the_way() -> None:
     assert hidden[inside][free].mean() < 0.002
 
 
+def test_occlusions_do_not_depend_on_the_size_of_the_images() -> None:
+    """Every third pixel centre of images of three times the size is one of the small images."""
+    small = synthetic.demo_rig().resized(430, 320, 320, 256)
+    large = small.resized(3 * 430, 3 * 320, 3 * 320, 3 * 256)
+    for seed in (1, 2, 3):
+        few, many = (synthetic.Street(rig, 1, seed=seed).occluded(0) for rig in (small, large))
+        assert few.mean() > 0.002
+        # The source image ends at its outermost pixel centres, which lie further out in the large.
+        assert (few & ~many[1::3, 1::3]).sum() <= 2
+        assert (few != many[1::3, 1::3]).mean() < 1e-3
+
+
 def test_one_camera_in_two_places_at_once_hides_nothing() -> None:
     camera = small_rig().reference
     street = synthetic.Street(Rig(camera, camera, np.eye(3), np.zeros(3)), 1)

@@ -23,6 +23,7 @@ from .scene import BEHIND, Scene
 from .texture import Array, Texture
 
 _NEAR = 0.05  # [m] nothing is nearer than this to a camera
+_ROW = 4096  # points in a row where OpenCV samples some: it refuses sides of 2^15 and more
 _BAND = 1.6  # a face is filtered for one distance at a time, within this factor
 
 
@@ -304,7 +305,9 @@ class Raster:
         if alpha is None or not len(u):
             return np.ones(len(u), bool)
         height, width = alpha.shape
-        x, y = (u * width - 0.5).astype(np.float32), (v * height - 0.5).astype(np.float32)
-        return (
-            cv2.remap(alpha, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel() > 127
-        )
+        at = np.zeros((2, -(-len(u) // _ROW) * _ROW), np.float32)
+        at[:, : len(u)] = u * width - 0.5, v * height - 0.5
+        x, y = at.reshape(2, -1, _ROW)
+        cut = cv2.remap(alpha, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        opaque: Array = cut.ravel()[: len(u)] > 127
+        return opaque
