@@ -7,10 +7,8 @@ from typing import Any
 
 import click
 
-from .._core import PlaneDepth
-from ..cli_options import file, number
-from .files import PNG_SCALE
-from .measured import MeasuredDepth
+from ..depth import PNG_SCALE, MeasuredDepth, PlaneDepth
+from .options import file, number
 
 PLANE = PlaneDepth()
 
