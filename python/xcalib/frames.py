@@ -118,7 +118,7 @@ _quiet_level, _quiet_users = 0, 0
 
 @contextlib.contextmanager
 def quiet_opencv() -> Iterator[None]:
-    """Without OpenCV's own words on a bad file: they would come between our line and its reader.
+    """Keep OpenCV from printing messages of its own on a bad file, beside our one line.
 
     The level is the whole process's: the first thread in takes it down, the last one out back up.
     """
@@ -207,7 +207,7 @@ def check_folder_writable(folder: str | Path) -> None:
     if not base.is_dir():
         raise InputError(f"cannot write to {folder}: {base} is a file, expected a folder")
     try:
-        # Only an attempt tells: access rights say nothing of read-only and special file systems.
+        # Only an attempt shows it: access rights do not reveal read-only and special file systems.
         with tempfile.TemporaryFile(dir=base):
             pass
     except OSError as error:

@@ -29,7 +29,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class PatchResidual:
-    """Shifts that remain between two registered images, one per patch that tells."""
+    """Shifts that remain between two registered images, one per patch with a distinct peak."""
 
     centers: NDArray[np.float32]  #: (N, 2) patch centres [px]
     shifts: NDArray[np.float32]  #: (N, 2) the registered image is displaced by this [px]
@@ -41,12 +41,12 @@ class PatchResidual:
 
     @property
     def median(self) -> float:
-        """Median length [px]; NaN where no patch tells."""
+        """Median length [px]; NaN without a patch."""
         return float(np.median(self.norms)) if len(self.shifts) else float("nan")
 
     @property
     def share_under_2px(self) -> float:
-        """Share of the patches shifted by less than 2 px; NaN where no patch tells."""
+        """Share of the patches shifted by less than 2 px; NaN without a patch."""
         return float(np.mean(self.norms < 2)) if len(self.shifts) else float("nan")
 
 
@@ -58,7 +58,7 @@ def patch_residual(
     """Measure what is left of the misalignment, with neither NEC nor the solver.
 
     On a grid of 48 x 48 patches (step 32) of 6-bin unsigned orientation-energy maps, the shift
-    within 14 px of the best normalized correlation; a patch tells where that peak stands 0.03
+    within 14 px of the best normalized correlation; a patch counts if that peak stands 0.03
     above the best outside 5 px. Meant for images about 580 px wide.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Model files: fetched once, checked ever after.
+"""Model files: fetched once, checked after that.
 
 The model folder holds the files and ``index.json``, which names where each came from and the hash
 it had when it came. There is no list of hashes to compare with: the first fetch is trusted, and
@@ -151,7 +151,7 @@ def _check(path: Path, expected: str) -> None:
 
 
 def _transfer(url: str, partial: Path, show: Callable[[int, int | None], None] | None) -> None:
-    """Append to ``partial`` what it lacks, or begin anew where the server has another file now."""
+    """Append to ``partial`` what it lacks, or start over where the server has another file now."""
     tag = partial.with_name(f"{partial.name}.etag")
     request = urllib.request.Request(url)
     have = partial.stat().st_size if partial.exists() and tag.exists() else 0

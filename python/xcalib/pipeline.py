@@ -1,4 +1,4 @@
-"""From frames on disk to a rig, with progress bars on stderr. `registration` goes on from there."""
+"""From frames on disk to a rig, with progress bars on stderr; `registration` is what follows."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Frames:
         return replace(self, sources=sources), line
 
     def fit(self, rig: Rig) -> Rig:
-        """The rig at the size of these frames, which the first one tells."""
+        """The rig at the size of these frames, read from the first one."""
         return fit_rig(rig, size_of(self.references[0]), size_of(self.sources[0]))
 
 
@@ -109,7 +109,7 @@ def misfit(depth: DepthProvider, rig: Rig) -> str:
 
 
 def choose_by_content(frames: Frames, max_frames: int, seed: int, quiet: bool = False) -> Choice:
-    """The frames that say most about the rig, see `choose`. Depth counts where it is cheap."""
+    """The frames that determine the rig best, see `choose`. Depth counts where it is cheap."""
     cheap = isinstance(frames.given_depth, FolderDepth | PlaneDepth | TopicDepth)
 
     def read(index: int) -> tuple[Image, Image, NDArray[np.float32] | None]:
@@ -137,8 +137,8 @@ def run_calibration(
 
     ``prepare`` completes the options once the images, and so their sizes, are known. Without
     ``chosen`` the frames are spread over the footage by the seed. Frames that cannot be decoded
-    are left out, and ``warn`` is told how many; if none is left, `InputError` names the first.
-    ``flow`` is a provider for the flow term, None the built-in one.
+    are left out, and ``warn`` is called with their number; if none is left, `InputError` names the
+    first. ``flow`` is a provider for the flow term, None the built-in one.
     """
     if chosen is None:
         chosen = choose_frames(len(frames), calibration.max_frames, calibration.seed)

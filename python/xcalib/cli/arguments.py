@@ -72,7 +72,7 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
 
 
 def open_frames(arguments: Mapping[str, Any], threads: int, rig: Rig | None) -> Frames:
-    """Open what `frames_arguments` names, and say how frames were paired by time."""
+    """Open what `frames_arguments` names, and print how frames were paired by time."""
     frames = Frames.open(inputs_of(arguments, threads), rig)
     for note in frames.notes:
         click.echo(note, err=True)
@@ -80,7 +80,7 @@ def open_frames(arguments: Mapping[str, Any], threads: int, rig: Rig | None) -> 
 
 
 def with_scalar_sources(frames: Frames, colormap: str) -> Frames:
-    """The frames with false colour turned back to numbers, said on stderr."""
+    """The frames with false colour turned back to numbers, with a line on stderr."""
     frames, line = frames.with_scalar_sources(colormap)
     if line:
         click.echo(line, err=True)

@@ -84,7 +84,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     type=click.Choice(["informed", "spread"]),
     default="informed",
     show_default=True,
-    help="Frames by what they say about the rig (looks at 4 N), or spread over the footage.",
+    help="Frames that determine the rig best (looks at 4 N), or spread over the footage.",
 )
 @click.option(
     "--explain", is_flag=True, help="Print why each frame was taken or left (--choose informed)."

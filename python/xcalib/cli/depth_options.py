@@ -1,4 +1,4 @@
-"""The command-line options about depth; those of `MeasuredDepth` bear the names of its fields."""
+"""The command-line options about depth; those of `MeasuredDepth` have the names of its fields."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class ErrorsInOneLine(click.Group):
             stop(FAILED, str(error) or "interrupted")
         except OSError as error:
             if error.errno == errno.EPIPE:
-                raise  # the reader of our output left: click ends quietly
+                raise  # nobody reads our output any more: click ends quietly
             named = f"{error.filename}: {error.strerror}" if error.filename else str(error)
             stop(WRONG_INPUT, named)
         except ValueError as error:

@@ -1,4 +1,4 @@
-"""`xcalib inspect`: what a rig file or a bag says."""
+"""`xcalib inspect`: what a rig file or a bag contains."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .documents import finite
 @rig_argument
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def command(rig_file: Path, as_json: bool) -> None:
-    """Print what a rig file says, in units one can picture; of a bag, what its cameras say."""
+    """Print the facts of a rig file, in units one can picture; of a bag, its cameras."""
     if is_bag(rig_file):
         for info in camera_infos(rig_file):
             click.echo(info.line())

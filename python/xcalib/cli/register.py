@@ -31,7 +31,7 @@ from .errors import NOT_TRUSTED, stop
 @click.option(
     "--overwrite",
     is_flag=True,
-    help="Begin anew.  [default: go on where an interrupted run of the same command ended]",
+    help="Start over.  [default: resume an interrupted run of the same command]",
 )
 @click.option(
     "--nearest",
@@ -44,7 +44,8 @@ from .errors import NOT_TRUSTED, stop
     type=click.Choice(["ignore", "mark", "hide"]),
     default="mark",
     show_default=True,
-    help="What the source sees something nearer in front of: told by the mask, or black as well.",
+    help="Pixels hidden from the source by something nearer: not marked, marked in the mask, or"
+    " black as well.",
 )
 @threads_option
 @quiet_option
@@ -63,7 +64,7 @@ def command(
 
     Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
 
-    Interrupted, the same command goes on where it ended: what is whole is not made again.
+    Interrupted, the same command resumes: what is whole is not made again.
     """
     rig = Rig.load(rig_file)
     frames = open_frames(inputs, threads, rig)

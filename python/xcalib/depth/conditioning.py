@@ -1,4 +1,4 @@
-"""Depth made fit for video: steadied in time, and only where asked for."""
+"""Depth averaged over the frames of a video, where asked for."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .provider import Depth, WrappedDepth
 class SteadyDepth(WrappedDepth):
     """Depth of another provider, averaged over time along the image flow, see `DepthSteadier`.
 
-    Call it with consecutive frames. Any other frame starts it anew and passes as it is.
+    Call it with consecutive frames. Any other frame restarts the average and passes unchanged.
     """
 
     is_parallel = False

@@ -26,7 +26,7 @@ SURROUNDINGS = 0.008
 
 @dataclass(frozen=True)
 class LidarCalibration:
-    """Where the reference camera stands to the lidar, and what it sees."""
+    """Pose of the reference camera relative to the lidar, and its intrinsics."""
 
     K: Array
     """Intrinsics of the reference camera ``(3, 3)`` [px], of images of ``image_size``."""

@@ -31,7 +31,7 @@ FAR, NEAR = 80.0, 2.0
 FARTHEST = 1e4
 """What relative depth says lies beyond infinity is as far as this [m]."""
 STEP = 0.1
-"""Depths that differ by more than this share are of two surfaces: nothing lies between them."""
+"""Depths that differ by more than this share belong to two surfaces: nothing lies between them."""
 
 _INTERPOLATION = {
     "linear": cv2.INTER_LINEAR,
@@ -42,7 +42,7 @@ _INTERPOLATION = {
 
 @dataclass(frozen=True)
 class NetworkOptions:
-    """How to run a depth network; what the command line says of it."""
+    """How to run a depth network: the options of the command line."""
 
     recipe: str | None = None
     """Name of the recipe, where no file beside the model names one."""
@@ -61,7 +61,7 @@ class NetworkOptions:
 
 @dataclass(frozen=True)
 class _Raw:
-    """What the network said of one image, without the border of a letterbox."""
+    """The network's output for one image, without the border of a letterbox."""
 
     values: Array
     focal: float
@@ -293,7 +293,7 @@ class NetworkDepth(DepthProvider):
 
 
 def to_depth(values: Array, recipe: Recipe, relative: RelativeDepth | None = None) -> Depth:
-    """Depth ``(h, w)`` [m] that a network's own output means; what is no number stays none.
+    """Depth ``(h, w)`` [m] that a network's own output means; what is not a number stays so.
 
     Infinity is farther than any depth. ``relative`` is for kind ``relative`` without a scale; None
     is this map's own `normalization`.

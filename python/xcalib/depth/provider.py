@@ -25,8 +25,8 @@ def reciprocal(values: Depth) -> Depth:
 class DepthProvider:
     """Depth of reference images: what sources of depth derive from.
 
-    The properties describe depth that one thread at a time may ask for, each frame on its own, in
-    metres, and made from no files; a source overrides those that are otherwise.
+    By default one thread at a time may ask, frames do not depend on each other, depth is in metres
+    and no files are known. A source overrides what differs.
     """
 
     def __call__(self, index: int, reference: Image) -> Depth:
@@ -55,7 +55,7 @@ class DepthProvider:
 
 @dataclass(frozen=True)
 class WrappedDepth(DepthProvider):
-    """Depth of another provider, changed; what it does not override is as of that one."""
+    """Depth made from that of another provider, whose properties it has unless overridden."""
 
     provider: DepthProvider
 

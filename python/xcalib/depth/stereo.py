@@ -106,7 +106,7 @@ def _matched(
         preFilterCap=31,
         mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
     )
-    # The matcher leaves out the columns from which the largest disparity leads out of the image.
+    # The matcher leaves out the columns from which the largest disparity points out of the image.
     margin, beyond = max(0, lowest + span), max(0, -lowest)
     wide = [
         cv2.copyMakeBorder(image, 0, 0, margin, beyond, cv2.BORDER_REPLICATE)

@@ -237,7 +237,7 @@ class Street:
                 np.multiply(square, square, out=square)
                 square += aside
                 np.multiply(square, square, out=square)
-                square += np.float32(40.0)  # [m^4] what is next to a lamp is not burnt out
+                square += np.float32(40.0)  # [m^4] keeps what is next to a lamp from saturating
                 np.divide(below, square, out=square)
                 light += square
         x, y, ahead = (points[axis] - np.float32(front[axis]) for axis in range(3))

@@ -23,7 +23,7 @@ from .scene import BEHIND, Scene
 from .texture import Array, Texture
 
 _NEAR = 0.05  # [m] nothing is nearer than this to a camera
-_ROW = 4096  # points in a row where OpenCV samples some: it refuses sides of 2^15 and more
+_ROW = 4096  # points in a row of the arrays given to OpenCV: it refuses sides of 2^15 and more
 _BAND = 1.6  # a face is filtered for one distance at a time, within this factor
 
 
@@ -120,7 +120,7 @@ class Raster:
         return np.concatenate([low, high], axis=1).astype(np.int64), depths
 
     def find_visible(self, dtype: DTypeLike) -> None:
-        """Fills `faces` (face per sample) and `inverse_depth` [1/m]; the sky takes what is left."""
+        """Fills `faces` (face per sample) and `inverse_depth` [1/m]; the sky fills the rest."""
         self.inverse_depth = np.zeros((self.height, self.width), dtype)
         self.faces = np.full((self.height, self.width), -1, np.int16)
         xs, ys = np.arange(self.width, dtype=np.float64), np.arange(self.height, dtype=np.float64)
@@ -277,7 +277,7 @@ class Raster:
         """Which of the points seen at `targets` lie behind a face other than their own.
 
         targets: (H, W, 3) as x [px], y [px], depth [m] in this camera, NaN where there is none;
-        owners: (H, W), the id of the face each point is on; -1 is nobody's.
+        owners: (H, W), the id of the face each point is on; -1 is no face's.
         """
         hidden = np.zeros(owners.shape, bool)
         with np.errstate(invalid="ignore"):
@@ -293,7 +293,7 @@ class Raster:
             near = (x > x0 - 1) & (x < x1) & (y > y0 - 1) & (y < y1)
             index = np.flatnonzero(near & ~found & (owner != self.ids[face]))
             p, q, w = self.A[face] @ np.stack([x[index], y[index], np.ones(len(index))])
-            # Not a hair's breadth in front: the faces of a body share their edges.
+            # By more than a rounding error in front: the faces of a body share their edges.
             between = (p >= 0) & (q >= 0) & (p <= w) & (q <= w) & (w * depth[index] > 1 + 1e-4)
             index, p, q, w = index[between], p[between], q[between], w[between]
             found[index[self._opaque(face, p / w, q / w)]] = True
