@@ -15,7 +15,7 @@ from common import data, machine
 from figures import figure
 
 import xcalib
-from xcalib._core import choose_frames as draw_frames
+from xcalib._core import draw_frames
 from xcalib.choose import choose_informed
 from xcalib.depth import FolderDepth
 from xcalib.evaluate import evaluate

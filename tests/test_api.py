@@ -276,11 +276,11 @@ def test_validation_names_field_value_and_range(changed: dict[str, Any], message
         CalibrationOptions(**changed).validate()
 
 
-def test_choose_frames() -> None:
-    assert _core.choose_frames(3, 32, 0) == [0, 1, 2]
-    chosen = _core.choose_frames(100, 10, seed=5)
+def test_draw_frames() -> None:
+    assert _core.draw_frames(3, 32, 0) == [0, 1, 2]
+    chosen = _core.draw_frames(100, 10, seed=5)
     assert [index // 10 for index in chosen] == list(range(10))
-    assert chosen == _core.choose_frames(100, 10, seed=5) != _core.choose_frames(100, 10, seed=6)
+    assert chosen == _core.draw_frames(100, 10, seed=5) != _core.draw_frames(100, 10, seed=6)
 
 
 # --- The registrar --------------------------------------------------------------------------------
@@ -566,7 +566,7 @@ def test_unusable_frames_are_named() -> None:
 
 def test_a_frame_that_is_not_chosen_is_checked_too() -> None:
     references, sources, depths = footage(8)
-    chosen = _core.choose_frames(8, 2, 0)
+    chosen = _core.draw_frames(8, 2, 0)
     unused = next(i for i in range(8) if i not in chosen)
     sources[unused] = sources[unused][:-1]
     assert f"source frame {unused}" in refused(references, sources, depths, max_frames=2)
@@ -668,7 +668,7 @@ def test_a_seed_gives_the_same_rig_again(
 ) -> None:
     options = CalibrationOptions(max_frames=2, seed=3, working_width=160)
     one, other = (xcalib.calibrate(*lists_of(frames), options=options) for _ in range(2))
-    assert one.report.frames == other.report.frames == _core.choose_frames(FRAMES, 2, 3)
+    assert one.report.frames == other.report.frames == _core.draw_frames(FRAMES, 2, 3)
     np.testing.assert_array_equal(one.rig.R, other.rig.R)
     np.testing.assert_array_equal(one.rig.t, other.rig.t)
     np.testing.assert_array_equal(one.rig.source.K, other.rig.source.K)

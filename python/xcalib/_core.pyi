@@ -362,7 +362,7 @@ class CalibrationResult:
     def report(self) -> CalibrationReport:
         """CalibrationReport."""
 
-def choose_frames(count: int, max_frames: int, seed: int) -> list[int]:
+def draw_frames(count: int, max_frames: int, seed: int) -> list[int]:
     """Indices of max_frames of count frames, spread over all, drawn with seed; sorted."""
 
 def calibrate(

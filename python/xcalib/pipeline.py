@@ -19,7 +19,7 @@ from ._core import (
     Choice,
     Rig,
     calibrate,
-    choose_frames,
+    draw_frames,
     frames_to_judge_plane,
 )
 from .choose import choose_informed
@@ -141,7 +141,7 @@ def run_calibration(
     first. ``flow`` is a provider for the flow term, None the built-in one.
     """
     if chosen is None:
-        chosen = choose_frames(len(frames), calibration.max_frames, calibration.seed)
+        chosen = draw_frames(len(frames), calibration.max_frames, calibration.seed)
     network = frames.depth.relative
     if network is not None:
         start = initial.relative_depth if initial is not None else None
