@@ -3,7 +3,8 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "xcalib/calibrate.hpp"
+#include "calibrate/study.hpp"
+#include "options.hpp"
 #include "xcalib/draw_frames.hpp"
 
 namespace xcalib {
@@ -55,10 +56,11 @@ FlowEstimator estimator_of(const py::object& flow) {
     };
 }
 
-CalibrationResult calibrated(const py::sequence& references, const py::sequence& sources,
-                             const py::sequence& depths, const std::optional<Rig>& initial,
-                             const CalibrationOptions& options, const py::object& progress,
-                             const py::object& flow) {
+CalibrationResult calibrated_parts(const Parts& parts, const py::sequence& references,
+                                   const py::sequence& sources, const py::sequence& depths,
+                                   const std::optional<Rig>& initial,
+                                   const CalibrationOptions& options, const py::object& progress,
+                                   const py::object& flow) {
     const HeldList r = list_of("reference", references, image_of);
     const HeldList s = list_of("source", sources, image_of);
     const HeldList d = list_of("depth", depths, [](const std::string& name, const py::object& map) {
@@ -71,7 +73,30 @@ CalibrationResult calibrated(const py::sequence& references, const py::sequence&
     };
     const FlowEstimator estimator = estimator_of(flow);
     const py::gil_scoped_release released;
-    return calibrate(r.views, s.views, d.views, initial, options, tell, estimator);
+    return calibrate_parts(parts, r.views, s.views, d.views, initial, options, tell, estimator);
+}
+
+CalibrationResult calibrated(const py::sequence& references, const py::sequence& sources,
+                             const py::sequence& depths, const std::optional<Rig>& initial,
+                             const CalibrationOptions& options, const py::object& progress,
+                             const py::object& flow) {
+    return calibrated_parts({}, references, sources, depths, initial, options, progress, flow);
+}
+
+void bind_parts(py::module_& m) {
+    py::class_<Parts>(m, "_Parts", "Parts of the method, for ablation studies: all belong on.")
+        .def(py::init(&options_from<Parts>))
+        .def_readwrite("images", &Parts::images)
+        .def_readwrite("pyramid", &Parts::pyramid)
+        .def_readwrite("stages", &Parts::stages)
+        .def_readwrite("floor", &Parts::floor)
+        .def_readwrite("pair_weights", &Parts::pair_weights)
+        .def_readwrite("normalization", &Parts::normalization)
+        .def_readwrite("depth_edges", &Parts::depth_edges);
+    m.def("_calibrate", &calibrated_parts, py::arg("parts"), py::arg("references"),
+          py::arg("sources"), py::arg("depths"), py::arg("initial") = py::none(),
+          py::arg("options") = CalibrationOptions{}, py::arg("progress") = py::none(),
+          py::arg("flow") = py::none(), "calibrate() with parts of the method off.");
 }
 
 }  // namespace
@@ -98,6 +123,7 @@ Images are copied only where they are not contiguous and aligned.
 
 Raises ValueError, naming the frame, on unusable input. Not to converge is a result:
 see CalibrationResult.converged.)");
+    bind_parts(m);
 }
 
 }  // namespace xcalib

@@ -5,6 +5,7 @@
 #include "bindings.hpp"
 #include "options.hpp"
 #include "xcalib/calibration_options.hpp"
+#include "xcalib/footage/pairing.hpp"
 
 namespace xcalib {
 namespace {
@@ -41,18 +42,6 @@ void bind_adam_options(py::module_& m) {
                        "Of Eq. (translation), 1 to 3.");
 }
 
-void bind_parts(py::module_& m) {
-    py::class_<Parts>(m, "_Parts", "Parts of the method, for ablation studies: all belong on.")
-        .def(py::init(&options_from<Parts>))
-        .def_readwrite("images", &Parts::images)
-        .def_readwrite("pyramid", &Parts::pyramid)
-        .def_readwrite("stages", &Parts::stages)
-        .def_readwrite("floor", &Parts::floor)
-        .def_readwrite("pair_weights", &Parts::pair_weights)
-        .def_readwrite("normalization", &Parts::normalization)
-        .def_readwrite("depth_edges", &Parts::depth_edges);
-}
-
 void bind_cameras(py::class_<CalibrationOptions>& options) {
     options
         .def_readwrite("reference_camera", &CalibrationOptions::reference_camera,
@@ -80,12 +69,33 @@ void bind_flow_term(py::class_<CalibrationOptions>& options) {
                        "Times at most that a stage at a level estimates flow; >= 1.");
 }
 
+// What the command asks for its options.
+void bind_option_words(py::module_& m) {
+    m.def(
+        "_option_words",
+        [] {
+            return std::map<std::string, std::vector<std::string>>{
+                {"search", names_of(words<SearchMode>())},
+                {"solver", names_of(words<Solver>())},
+                {"occlusion", names_of(words<Occlusion>())},
+                {"pair", {kPairingMethods.begin(), kPairingMethods.end()}}};
+        },
+        "The words that each option of the command takes.");
+    m.def(
+        "_flow_arguments",
+        [] {
+            py::dict modes;
+            for (const auto& [mode, word] : flow_arguments()) modes[word] = word_of(mode);
+            return modes;
+        },
+        "CalibrationOptions.flow by what --flow of the command takes.");
+}
+
 }  // namespace
 
 void bind_calibration_options(py::module_& m) {
     bind_search_options(m);
     bind_adam_options(m);
-    bind_parts(m);
     py::class_<CalibrationOptions> options(m, "CalibrationOptions",
                                            "Options of calibrate(). Keyword arguments set fields.");
     options.def(py::init(&options_from<CalibrationOptions>))
@@ -105,19 +115,9 @@ void bind_calibration_options(py::module_& m) {
     def_word(options, "solver", &CalibrationOptions::solver, "solver",
              "'ceres', or 'adam' as published, which searches nothing.");
     options.def_readwrite("adam", &CalibrationOptions::adam, "AdamOptions.")
-        .def_readwrite("_parts", &CalibrationOptions::parts)
         .def("validate", &CalibrationOptions::validate,
              "Raises ValueError naming the field, its value and the allowed range.");
-    m.def(
-        "_option_words",
-        [] {
-            return std::map<std::string, std::vector<std::string>>{
-                {"search", names_of(words<SearchMode>())},
-                {"flow", names_of(flow_arguments())},
-                {"solver", names_of(words<Solver>())},
-                {"occlusion", names_of(words<Occlusion>())}};
-        },
-        "The words that options of the command go by.");
+    bind_option_words(m);
 }
 
 }  // namespace xcalib

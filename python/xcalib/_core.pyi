@@ -975,6 +975,12 @@ class Evaluator:
     def result(self) -> Evaluation:
         """The Evaluation; ValueError without a frame."""
 
+def _option_words() -> dict[str, list[str]]:
+    """The words that each option of the command takes."""
+
+def _flow_arguments() -> dict[str, str]:
+    """CalibrationOptions.flow by what --flow of the command takes."""
+
 def describe(rig: Rig) -> dict[str, Any]:
     """What follows from the rig's parameters, in px, deg and m.
 
