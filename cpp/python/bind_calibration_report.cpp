@@ -1,54 +1,13 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
+#include "json.hpp"
 #include "xcalib/calibration_report.hpp"
 
 namespace xcalib {
 namespace {
 
 namespace py = pybind11;
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
-
-py::dict time_of(const CalibrationReport& report) {
-    const CalibrationTimes& time = report.time;
-    return py::dict(py::arg("prepare") = time.prepare, py::arg("search") = time.search,
-                    py::arg("warp") = time.warp, py::arg("value") = time.value,
-                    py::arg("jacobian") = time.jacobian, py::arg("solver") = time.solver);
-}
-
-py::dict dict_of(const CalibrationReport& report) {
-    py::list candidates, levels, steps;
-    for (const AdamStep& s : report.steps)
-        steps.append(py::dict(py::arg("learning_rate") = s.learning_rate,
-                              py::arg("image") = s.image, py::arg("flow") = s.flow,
-                              py::arg("prior") = s.prior, py::arg("total") = s.total));
-    for (const CandidateReport& c : report.candidates)
-        candidates.append(
-            py::dict(py::arg("score") = c.score, py::arg("correlation") = c.correlation,
-                     py::arg("overlap") = c.overlap, py::arg("refined_nec") = c.refined_nec,
-                     py::arg("reference_hfov_deg") = c.refined.reference.hfov() / kDegree,
-                     py::arg("source_hfov_deg") = c.refined.source.hfov() / kDegree));
-    for (const LevelReport& l : report.levels)
-        levels.append(
-            py::dict(py::arg("factor") = l.factor, py::arg("stage") = l.stage,
-                     py::arg("width") = l.width, py::arg("height") = l.height,
-                     py::arg("iterations") = l.iterations, py::arg("initial_cost") = l.initial_cost,
-                     py::arg("final_cost") = l.final_cost, py::arg("nec") = l.nec,
-                     py::arg("aligned") = l.aligned, py::arg("valid_share") = l.valid_share,
-                     py::arg("condition_number") = l.condition_number,
-                     py::arg("seconds") = l.seconds, py::arg("stopped") = l.stopped));
-    return py::dict(
-        py::arg("converged") = report.converged, py::arg("message") = report.message,
-        py::arg("seconds") = report.seconds, py::arg("time") = time_of(report),
-        py::arg("working_width") = report.working_width,
-        py::arg("working_height") = report.working_height, py::arg("nec") = report.nec,
-        py::arg("baseline_nec") = report.baseline_nec, py::arg("contrast") = report.contrast,
-        py::arg("repeatability_px") = report.repeatability_px,
-        py::arg("visible_shift_px") = report.visible_shift_px,
-        py::arg("valid_share") = report.valid_share, py::arg("frames") = report.frames,
-        py::arg("candidates") = candidates, py::arg("levels") = levels, py::arg("steps") = steps);
-}
 
 void bind_level_report(py::module_& m) {
     py::class_<LevelReport>(m, "LevelReport", "One solve: a stage at a level of the pyramid.")
@@ -102,7 +61,8 @@ void bind_calibration_report(py::module_& m) {
         .def_readonly("message", &CalibrationReport::message, "Why, in one line.")
         .def_readonly("seconds", &CalibrationReport::seconds, "[s]")
         .def_property_readonly(
-            "time", &time_of,
+            "time",
+            [](const CalibrationReport& report) { return object_of(json_of(report)["time"]); },
             "Where they go [s]: `prepare` (working images and their pyramid), `search`, `warp`\n"
             "(reprojection and sampling of the passes over image pairs), `value` (the rest of the\n"
             "passes without derivatives), `jacobian` (the rest of those with them), `solver` "
@@ -131,7 +91,9 @@ void bind_calibration_report(py::module_& m) {
         .def_readonly("steps", &CalibrationReport::steps, "AdamStep, of solver 'adam'.")
         .def("brief", &CalibrationReport::brief, "One line.")
         .def("full", &CalibrationReport::full, "A table.")
-        .def("to_dict", &dict_of, "Plain lists and numbers, as for JSON.");
+        .def(
+            "to_dict", [](const CalibrationReport& report) { return object_of(json_of(report)); },
+            "Plain lists and numbers, as for JSON.");
 }
 
 }  // namespace xcalib

@@ -2,16 +2,11 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "json.hpp"
 #include "xcalib/judge/evaluate.hpp"
 
 namespace xcalib {
 namespace {
-
-py::dict dict_of(const Scores& scores) {
-    py::dict out;
-    for (std::size_t i = 0; i < scores.size(); ++i) out[kScoreNames[i]] = scores[i];
-    return out;
-}
 
 void bind_evaluation(py::module_& m) {
     py::class_<Evaluation>(m, "Evaluation", "Scores of the registered and the unregistered source.")
@@ -21,25 +16,22 @@ void bind_evaluation(py::module_& m) {
         .def_readonly("valid_share", &Evaluation::valid_share,
                       "Mean share of the pixels judged, [0, 1].")
         .def_property_readonly(
-            "registered", [](const Evaluation& e) { return dict_of(e.registered); },
+            "registered", [](const Evaluation& e) { return object_of(json_of(e.registered)); },
             "Scores by name, means over the frames; NaN where undefined.")
         .def_property_readonly(
-            "unregistered", [](const Evaluation& e) { return dict_of(e.unregistered); },
+            "unregistered", [](const Evaluation& e) { return object_of(json_of(e.unregistered)); },
             "The same of the source that is only resized.")
         .def_property_readonly(
             "gain_percent",
-            [](const Evaluation& e) {
-                Scores gains;
-                for (std::size_t i = 0; i < gains.size(); ++i) gains[i] = e.gain(i);
-                return dict_of(gains);
-            },
+            [](const Evaluation& e) { return object_of(json_of(e)["gain_percent"]); },
             "Change of each score by registration [%], NaN where undefined.")
         .def_property_readonly(
             "frames",
             [](const Evaluation& e) {
                 py::list frames;
                 for (const auto& [registered, unregistered] : e.frames)
-                    frames.append(py::make_tuple(dict_of(registered), dict_of(unregistered)));
+                    frames.append(py::make_tuple(object_of(json_of(registered)),
+                                                 object_of(json_of(unregistered))));
                 return frames;
             },
             "Registered and unregistered scores of each frame.")
@@ -55,6 +47,7 @@ void bind_evaluate(py::module_& m) {
              py::arg("num_threads") = 0,
              "width: the reference is reduced by the smallest integer that makes it at most this "
              "wide [px]. num_threads: 0 means all cores.")
+             "wide [px]. num_threads: 0 means all cores.")
         .def(
             "add",
             [](Evaluator& evaluator, const py::object& reference, const py::object& source,
@@ -65,6 +58,8 @@ void bind_evaluate(py::module_& m) {
         evaluator.add(r.view, s.view, d.view);
             },
             py::arg("reference"), py::arg("source"), py::arg("depth"),
+            "Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m].")
+        .def("result", &Evaluator::result, "The Evaluation; ValueError without a frame.");
 }
 
 }  // namespace xcalib

@@ -48,5 +48,6 @@ PYBIND11_MODULE(_core, m) {
 
     xcalib::bind_evaluate(m);
     xcalib::bind_describe(m);
+    xcalib::bind_documents(m);
     xcalib::bind_overlay(m);
 }

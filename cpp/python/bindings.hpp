@@ -27,6 +27,7 @@ void bind_steady_depth(pybind11::module_& m);
 
 void bind_evaluate(pybind11::module_& m);
 void bind_describe(pybind11::module_& m);
+void bind_documents(pybind11::module_& m);
 void bind_overlay(pybind11::module_& m);
 
 }  // namespace xcalib
