@@ -6,6 +6,7 @@
 
 #include "xcalib/camera.hpp"
 #include "xcalib/export.hpp"
+#include "xcalib/mount.hpp"
 
 namespace XCALIB_EXPORT xcalib {
 
@@ -42,7 +43,7 @@ struct AdamOptions {
 struct SearchOptions {
     SearchMode mode = SearchMode::automatic;
     double max_fov_ratio = 2.5;  // of the tangents, either way, (1, 10]
-    double max_roll_deg = 5.0;   // [deg], >= 0
+    double max_roll_deg = 5.0;   // about the mount [deg], [0, 180]
     double min_overlap = 0.3;    // (0, 1): geometric mean of the shares of both images' edges
     int map_width = 96;          // [px], >= 32
     int candidates = 12;         // peaks considered, >= 1
@@ -72,6 +73,9 @@ struct CalibrationOptions {
     // the scale stays as the gauge of the translation, and the rig has both. None: metric.
     std::optional<RelativeDepth> relative_depth;
 
+    // None: upright; where that is not found, quarter turns, mirrors and all between are looked
+    // for.
+    std::optional<Mount> mount;
     SearchOptions search;
     Solver solver = Solver::ceres;
     AdamOptions adam;

@@ -30,6 +30,8 @@ struct Pinhole {
     double hfov() const;  // 2 atan(width / (2 fx))
     double vfov() const;
 
+    // The same camera seen through its image flipped left to right.
+    Pinhole flipped() const;
     // The same camera seen through an image of another size: x -> f x + (f - 1) / 2.
     Pinhole resized(int new_width, int new_height) const;
 
@@ -58,6 +60,9 @@ struct Rig {
     Pinhole source;
     Pose source_from_reference;
     std::optional<RelativeDepth> relative_depth = std::nullopt;  // none: metric depth
+    // The source's image is a mirror image: its columns count against the camera's x axis,
+    // u = cx - fx X/Z + skew Y/Z.
+    bool source_mirrored = false;
 
     Eigen::Matrix3d R() const { return source_from_reference.rotation.toRotationMatrix(); }
     const Eigen::Vector3d& t() const { return source_from_reference.translation; }
@@ -66,6 +71,9 @@ struct Rig {
                 int source_height) const;
     void validate() const;
 };
+
+// The same rig for sources that have been flipped left to right.
+Rig with_flipped_source(const Rig& rig);
 
 // The rig for images of these sizes [px]: itself, or rescaled where both have the rig's aspects, to
 // within a pixel. Throws InputError where one has not.

@@ -7,6 +7,7 @@
 
 #include "base/parallel.hpp"
 #include "calibrate/adam.hpp"
+#include "calibrate/find_mounts.hpp"
 #include "calibrate/relative_depth.hpp"
 #include "calibrate/start.hpp"
 #include "calibrate/study.hpp"
@@ -43,25 +44,19 @@ void validate(const std::vector<ImageView>& references, const std::vector<ImageV
     }
 }
 
-// Global search, then Levenberg-Marquardt from coarse to fine.
-void search_and_refine(const WorkingImages& images, const ImageView& reference,
-                       const ImageView& source, const std::optional<Rig>& initial, const Plan& plan,
-                       const Progress& tell, CalibrationResult& result) {
+// Levenberg-Marquardt on all frames, from the level at which the start was found on some of them.
+void refine(const WorkingImages& images, const Start& found, const Plan& plan, const Progress& tell,
+            CalibrationResult& result) {
     CalibrationReport& report = result.report;
     const int num_threads = plan.options.num_threads;
-    tell("search", 0.05);
-    const Start found = find_start(images, reference, source, initial, plan,
-                                   [&](double share) { tell("search", 0.05 + 0.55 * share); });
-    report.time.search = found.search_seconds;
     report.candidates = found.candidates;
     report.levels = found.levels;
     result.rig = found.rig;
 
-    // All frames, from the level at which the start was found on some of them.
     const int from = plan.from_coarsest ? kFactors[0] : found.levels.back().factor;
     double limit = 0;
-    // Half size decides, so it is solved to the finer tolerance: it makes up for what the coarse
-    // level leaves, and at full size a step costs most.
+    // The middle levels decide; what the coarse one leaves they find, and at the finest a step
+    // costs most.
     const auto tolerance = [](int factor) { return factor == 2 ? 1e-6 : 1e-5; };
     const std::vector<Step> steps =
         schedule(report.working_width, report.working_height, plan.parts);
@@ -96,6 +91,66 @@ void settle_relative_depth(const Plan& plan, WorkingImages& images, CalibrationR
     result.rig.relative_depth = relative;
 }
 
+// The footage, and how it is looked at in one attempt: sources that a mount mirrors are flipped, so
+// that nothing within knows of mirrors.
+struct Attempt {
+    WorkingImages images;
+    Plan plan;
+    std::optional<Rig> initial;
+
+    Attempt(const WorkingImages& all, const Plan& base, const std::optional<Rig>& given,
+            const Mount& mount)
+        : images(mount.mirrored ? with_mirrored_sources(all) : all), plan(base), initial(given) {
+        plan.mount = mount;
+        if (!mount.mirrored) return;
+        if (plan.options.source_camera)
+            plan.options.source_camera = base.options.source_camera->flipped();
+        if (given) initial = with_flipped_source(*given);
+    }
+
+    // In the images as they were given.
+    Rig given(const Rig& rig) const { return plan.mount.mirrored ? with_flipped_source(rig) : rig; }
+};
+
+// From a rig to a result: what is left once it is solved.
+void settle(Attempt& attempt, CalibrationResult& result) {
+    CalibrationReport& report = result.report;
+    if (attempt.plan.options.relative_depth)
+        settle_relative_depth(attempt.plan, attempt.images, result);
+    report.nec = report.levels.back().nec;
+    report.valid_share = report.levels.back().valid_share;
+    judge(attempt.images, result.rig, attempt.plan, report);
+    result.converged = report.converged;
+    result.rig = attempt.given(result.rig);
+    for (CandidateReport& candidate : report.candidates) {
+        candidate.found = attempt.given(candidate.found);
+        candidate.refined = attempt.given(candidate.refined);
+    }
+}
+
+// The best start of the mounts that the footage may have, and how it is looked at; none where the
+// edges of no other agree clearly better than those of `upright`.
+struct Turned {
+    Attempt attempt;
+    Start start;
+};
+std::optional<Turned> best_turned(const WorkingImages& images, const ImageView& reference,
+                                  const ImageView& source, const Plan& plan, const Start& upright) {
+    constexpr std::size_t kMounts = 2;
+    constexpr double kClearly = 1.15;
+    std::optional<Turned> best;
+    double merit = kClearly * upright.merit;
+    for (const Mount& mount : find_mounts(images, reference, source, plan, kMounts)) {
+        Attempt attempt(images, plan, std::nullopt, mount);
+        Start start = find_start(attempt.images, reference, source, std::nullopt, attempt.plan,
+                                 [](double) {});
+        if (start.merit <= merit) continue;
+        merit = start.merit;
+        best = Turned{std::move(attempt), std::move(start)};
+    }
+    return best;
+}
+
 }  // namespace
 
 CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageView>& references,
@@ -113,33 +168,47 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
 
     const WorkersOfThread workers(resolve_threads(options.num_threads));
     CalibrationResult result;
-    CalibrationReport& report = result.report;
-    report.frames =
+    result.report.frames =
         draw_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
     tell("prepare", 0.0);
-    WorkingImages images = make_working_images(references, sources, depths, report.frames, plan);
-    report.working_width = images.references[0].width;
-    report.working_height = images.references[0].height;
+    const WorkingImages images =
+        make_working_images(references, sources, depths, result.report.frames, plan);
+    result.report.working_width = images.references[0].width;
+    result.report.working_height = images.references[0].height;
 
+    Mount mount = plan.mount;
+    if (initial) mount.mirrored = initial->source_mirrored;
+    Attempt attempt(images, plan, initial, mount);
+    double search_seconds = 0.0;
     if (options.solver == Solver::adam) {
         tell("refine", 0.05);
-        result.rig = given_start(references[0], sources[0], initial, options);
+        result.rig = given_start(references[0], sources[0], attempt.initial, attempt.plan.options);
         solve_adam(
-            images, plan, [&](double share) { tell("refine", 0.05 + 0.9 * share); }, result.rig,
-            report);
+            attempt.images, attempt.plan, [&](double share) { tell("refine", 0.05 + 0.9 * share); },
+            result.rig, result.report);
+        settle(attempt, result);
     } else {
-        search_and_refine(images, references[0], sources[0], initial, plan, tell, result);
+        tell("search", 0.05);
+        const Start found =
+            find_start(attempt.images, references[0], sources[0], attempt.initial, attempt.plan,
+                       [&](double share) { tell("search", 0.05 + 0.55 * share); });
+        search_seconds = found.search_seconds;
+        const CalibrationResult empty = result;
+        refine(attempt.images, found, attempt.plan, tell, result);
+        settle(attempt, result);
+        if (!result.converged && plan.searches && !initial && !options.mount) {
+            tell("mount", 0.96);
+            if (auto turned = best_turned(images, references[0], sources[0], plan, found)) {
+                result = empty;
+                refine(turned->attempt.images, turned->start, turned->attempt.plan, tell, result);
+                settle(turned->attempt, result);
+            }
+        }
     }
-    if (options.relative_depth) settle_relative_depth(plan, images, result);
-    report.nec = report.levels.back().nec;
-    report.valid_share = report.levels.back().valid_share;
-    judge(images, result.rig, plan, report);
-    result.converged = report.converged;
     tell("judge", 1.0);
-    report.seconds = seconds_now() - start;
-    const double search = report.time.search;
-    report.time = images.times->seconds(resolve_threads(options.num_threads));
-    report.time.search = search;
+    result.report.seconds = seconds_now() - start;
+    result.report.time = images.times->seconds(resolve_threads(options.num_threads));
+    result.report.time.search = search_seconds;
     return result;
 }
 

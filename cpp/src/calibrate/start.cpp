@@ -19,60 +19,6 @@ Pinhole camera_guess(const ImageView& image, double hfov) {
     return Pinhole::from_hfov(image.width, image.height, hfov);
 }
 
-SearchSpace search_space(const ImageView& reference, const ImageView& source,
-                         const std::optional<Rig>& initial, const CalibrationOptions& options) {
-    constexpr double kScaleStep = 1.06;
-    constexpr double kRollStep = 4 * kDegree;
-    const bool local = initial && options.search.mode != SearchMode::full;
-    SearchSpace space;
-    space.options = options.search;
-
-    std::vector<Pinhole> cameras;
-    if (options.reference_camera) {
-        cameras = {*options.reference_camera};
-    } else if (initial) {
-        cameras = {initial->reference};
-    } else if (options.reference_hfov_deg) {
-        cameras = {camera_guess(reference, *options.reference_hfov_deg * kDegree)};
-    } else {
-        for (double hfov : {60.0, 40.0, 82.0})
-            cameras.push_back(camera_guess(reference, hfov * kDegree));
-    }
-    for (const Pinhole& camera : cameras) {
-        SearchHypothesis hypothesis{camera, {}};
-        if (options.source_camera) {
-            hypothesis.sources = {*options.source_camera};
-        } else {
-            // Fields of view are compared by their tangents, as focal lengths are.
-            const Pinhole& centre = local ? initial->source : camera;
-            const double ratio = local ? 1.15 : options.search.max_fov_ratio;
-            const double widest = std::tan(60 * kDegree);
-            const int steps = static_cast<int>(std::ceil(std::log(ratio) / std::log(kScaleStep)));
-            for (int i = -steps; i <= steps; ++i) {
-                const double scale = std::pow(ratio, static_cast<double>(i) / steps);
-                const double tangent = scale * std::tan(centre.hfov() / 2);
-                if (tangent > widest) continue;
-                Pinhole guess = camera_guess(source, 2 * std::atan(tangent));
-                if (local) {
-                    guess = initial->source;
-                    guess.fx /= scale;
-                    guess.fy /= scale;
-                }
-                hypothesis.sources.push_back(guess);
-            }
-        }
-        space.hypotheses.push_back(hypothesis);
-    }
-    const double max_roll = (local ? 3.0 : options.search.max_roll_deg) * kDegree;
-    const int rolls = static_cast<int>(std::lround(max_roll / kRollStep));
-    for (int i = -rolls; i <= rolls; ++i) space.rolls.push_back(rolls ? i * max_roll / rolls : 0.0);
-    if (local) {
-        space.base = initial->R();
-        space.max_shift = 0.15;
-    }
-    return space;
-}
-
 // What candidates are compared by: how well edges agree beyond chance, and over how much of the
 // image. Chance grows as the overlap shrinks. `value`: a NecValue or a LevelReport.
 template <class Value>
@@ -131,17 +77,17 @@ Rig with_parallax(const Rig& rig, const Eigen::Vector3d& t, double inverse_depth
 
 // The same rig with a reference of another focal length: the source's follows, so that the scale
 // stays, and rotation and translation, so that the middle of the image and its parallax do.
-Rig with_reference_focal(const Rig& rig, double factor) {
+Rig with_reference_focal(const Rig& rig, const Eigen::Quaterniond& mount, double factor) {
     Rig out = rig;
     out.reference.fx *= factor;
     out.reference.fy *= factor;
     out.source.fx *= factor;
     out.source.fy *= factor;
-    const Eigen::AngleAxisd rotation(rig.source_from_reference.rotation);
+    const Eigen::AngleAxisd rotation(rig.source_from_reference.rotation * mount.conjugate());
     const Eigen::Vector3d vector = rotation.angle() * rotation.axis();
     // Roll is an angle in the image; pan and tilt are displacements over the focal length.
     const Eigen::Vector3d scaled(vector.x() / factor, vector.y() / factor, vector.z());
-    out.source_from_reference.rotation = Eigen::Quaterniond::Identity();
+    out.source_from_reference.rotation = mount;
     out = turn_source(out, scaled);
     out.source_from_reference.translation = rig.t() / factor;
     return out;
@@ -166,8 +112,11 @@ void choose_best(const Level& level, int num_threads, int count, const Variant& 
 // The search sees one displacement for all depths, at coarse steps of scale and roll. This looks
 // for the baseline that goes with it, and for what the search has rounded, on grids in turn whose
 // steps are about a pixel of the level.
-void place(const Level& level, const InverseDepths& inverse, bool free_focal,
-           const CalibrationOptions& options, Candidate& candidate) {
+void place(const Level& level, const InverseDepths& inverse, bool free_focal, const Plan& plan,
+           Candidate& candidate) {
+    const CalibrationOptions& options = plan.options;
+    const Eigen::Quaterniond mount(
+        Eigen::AngleAxisd(plan.mount.roll_deg * kDegree, Eigen::Vector3d::UnitZ()));
     const double f = level.rig_at(candidate.rig).source.fx;
     const double half = 0.5 * level.width * f / level.rig_at(candidate.rig).reference.fx;
     candidate.merit =
@@ -182,7 +131,7 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal,
                 [&](int i) {
                     const int x = i % (2 * kReachX + 1) - kReachX,
                               y = i / (2 * kReachX + 1) - kReachY;
-                    return with_parallax(from, Eigen::Vector3d(x * step, y * step, 0),
+                    return with_parallax(from, mount * Eigen::Vector3d(x * step, y * step, 0),
                                          inverse.median);
                 },
                 candidate);
@@ -195,7 +144,7 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal,
                 level, options.num_threads, kFocals,
                 [&](int i) {
                     const double focal = paper * std::pow(1.2, i - 5);
-                    return with_reference_focal(from,
+                    return with_reference_focal(from, mount,
                                                 focal * from.reference.width / from.reference.fx);
                 },
                 candidate);
@@ -234,6 +183,63 @@ void keep_best(std::vector<Candidate>& candidates, std::size_t count) {
 }
 
 }  // namespace
+
+SearchSpace search_space(const ImageView& reference, const ImageView& source,
+                         const std::optional<Rig>& initial, const Plan& plan, double scale_step) {
+    const CalibrationOptions& options = plan.options;
+    constexpr double kRollStep = 4 * kDegree;
+    const bool local = initial && options.search.mode != SearchMode::full;
+    SearchSpace space;
+    space.options = options.search;
+
+    std::vector<Pinhole> cameras;
+    if (options.reference_camera) {
+        cameras = {*options.reference_camera};
+    } else if (initial) {
+        cameras = {initial->reference};
+    } else if (options.reference_hfov_deg) {
+        cameras = {camera_guess(reference, *options.reference_hfov_deg * kDegree)};
+    } else {
+        for (double hfov : {60.0, 40.0, 82.0})
+            cameras.push_back(camera_guess(reference, hfov * kDegree));
+    }
+    for (const Pinhole& camera : cameras) {
+        SearchHypothesis hypothesis{camera, {}};
+        if (options.source_camera) {
+            hypothesis.sources = {*options.source_camera};
+        } else {
+            // Fields of view are compared by their tangents, as focal lengths are.
+            const Pinhole& centre = local ? initial->source : camera;
+            const double ratio = local ? 1.15 : options.search.max_fov_ratio;
+            const double widest = std::tan(60 * kDegree);
+            const int steps = static_cast<int>(std::ceil(std::log(ratio) / std::log(scale_step)));
+            for (int i = -steps; i <= steps; ++i) {
+                const double scale = std::pow(ratio, static_cast<double>(i) / steps);
+                const double tangent = scale * std::tan(centre.hfov() / 2);
+                if (tangent > widest) continue;
+                Pinhole guess = camera_guess(source, 2 * std::atan(tangent));
+                if (local) {
+                    guess = initial->source;
+                    guess.fx /= scale;
+                    guess.fy /= scale;
+                }
+                hypothesis.sources.push_back(guess);
+            }
+        }
+        space.hypotheses.push_back(hypothesis);
+    }
+    const double max_roll = (local ? 3.0 : options.search.max_roll_deg) * kDegree;
+    const int rolls = static_cast<int>(std::lround(max_roll / kRollStep));
+    // A rig that is given is where its mount is.
+    const double middle = local ? 0.0 : plan.mount.roll_deg * kDegree;
+    for (int i = -rolls; i <= rolls; ++i)
+        space.rolls.push_back(middle + (rolls ? i * max_roll / rolls : 0.0));
+    if (local) {
+        space.base = initial->R();
+        space.max_shift = 0.15;
+    }
+    return space;
+}
 
 std::vector<Step> schedule(int width, int height, const Parts& parts) {
     constexpr int kSmallestSide = 40;
@@ -275,7 +281,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     std::vector<SearchCandidate> found;
     if (plan.searches) {
         found = global_search(images.reference_edges, images.source_edges,
-                              search_space(reference, source, initial, options), num_threads);
+                              search_space(reference, source, initial, plan), num_threads);
     } else {
         SearchCandidate given;
         given.rig = given_start(reference, source, initial, options);
@@ -310,7 +316,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         if (plan.searches && initial)
             candidate.rig = with_parallax(peak.rig, initial->t(), inverse.median);
         const Level level = make_level(few, placing, candidate.rig, num_threads);
-        if (plan.searches) place(level, inverse, focal_free, options, candidate);
+        if (plan.searches) place(level, inverse, focal_free, plan, candidate);
         const NecValue value = pooled(level, candidate.rig, num_threads);
         if (!plan.searches) candidate.merit = merit(value);
         candidate.share_limit = share_limit(value.valid_share);
@@ -347,6 +353,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     }
     keep_best(candidates, 1);
     out.rig = candidates[0].rig;
+    out.merit = candidates[0].merit;
     out.levels = candidates[0].levels;
     return out;
 }

@@ -7,6 +7,7 @@
 
 #include "solve/working_images.hpp"
 #include "xcalib/calibration_report.hpp"
+#include "xcalib/search.hpp"
 
 namespace xcalib {
 
@@ -20,11 +21,18 @@ struct Step {
 // free from there on. Levels too small to have edges are left out, but for the finest.
 std::vector<Step> schedule(int width, int height, const Parts& parts);
 
+// Where a full or a local search looks, at steps of the scale by so much.
+inline constexpr double kFineScaleStep = 1.06;
+SearchSpace search_space(const ImageView& reference, const ImageView& source,
+                         const std::optional<Rig>& initial, const Plan& plan,
+                         double scale_step = kFineScaleStep);
+
 struct Start {
     Rig rig;
     std::vector<CandidateReport> candidates;
     std::vector<LevelReport> levels;  // that led to `rig`
     double search_seconds = 0.0;
+    double merit = 0.0;  // how well edges agree beyond chance, and over how much of the image
 };
 
 // Where nothing is searched: the initial rig, or the paper's start, 45 deg and the identity; known

@@ -44,6 +44,13 @@ Eigen::Matrix3d Pinhole::K() const {
 double Pinhole::hfov() const { return 2 * std::atan(width / (2 * fx)); }
 double Pinhole::vfov() const { return 2 * std::atan(height / (2 * fy)); }
 
+Pinhole Pinhole::flipped() const {
+    Pinhole out = *this;
+    out.cx = width - 1 - cx;
+    out.skew = -skew;
+    return out;
+}
+
 Pinhole Pinhole::resized(int new_width, int new_height) const {
     require(new_width > 0, "resized camera", "width", new_width, "at least 1 px");
     require(new_height > 0, "resized camera", "height", new_height, "at least 1 px");
@@ -73,7 +80,8 @@ void Pinhole::validate(const char* name) const {
 Rig Rig::resized(int reference_width, int reference_height, int source_width,
                  int source_height) const {
     return {reference.resized(reference_width, reference_height),
-            source.resized(source_width, source_height), source_from_reference, relative_depth};
+            source.resized(source_width, source_height), source_from_reference, relative_depth,
+            source_mirrored};
 }
 
 void RelativeDepth::validate(const char* name) const {
@@ -91,6 +99,13 @@ void Rig::validate() const {
         require(std::isfinite(t()[i]), "source_from_reference", "translation", t()[i],
                 "a finite number of metres");
     if (relative_depth) relative_depth->validate("relative_depth");
+}
+
+Rig with_flipped_source(const Rig& rig) {
+    Rig out = rig;
+    out.source = rig.source.flipped();
+    out.source_mirrored = !rig.source_mirrored;
+    return out;
 }
 
 Rig fitted(const Rig& rig, int reference_width, int reference_height, int source_width,

@@ -5,6 +5,7 @@ namespace xcalib {
 Plan::Plan(const CalibrationOptions& given, const FlowEstimator& flow, const Parts& kept)
     : options(given), estimator(flow), parts(kept) {
     options.validate();
+    mount = options.mount.value_or(Mount{});
     searches = options.solver != Solver::adam && options.search.mode != SearchMode::off;
     // A caller who gives an estimator wants it used.
     const bool wanted =

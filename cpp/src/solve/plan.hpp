@@ -23,6 +23,7 @@ struct Plan {
                   const Parts& parts = {});
 
     CalibrationOptions options;
+    Mount mount;              // that is tried
     FlowEstimator estimator;  // of the caller; none: the built-in patch flow
     Parts parts;
 
