@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 
@@ -70,39 +71,19 @@ void refine(const WorkingImages& images, const Start& found, const Plan& plan, c
     }
 }
 
-// Estimates the shift of relative depth; images and rig are then those of the shifted depth.
-void settle_relative_depth(const Plan& plan, WorkingImages& images, CalibrationResult& result) {
-    const double farthest = farthest_inverse_depth(images);
-    RelativeDepth relative = *plan.options.relative_depth;
-    double shift = 0;
-    if (plan.options.source_camera) {
-        shift = best_shift(images, plan, farthest, result.rig);
-        images = with_shifted_depth(images, shift);
-        const Level level = make_level(images, 1, result.rig, plan.options.num_threads);
-        result.report.levels.push_back(
-            solve_level(level, {}, 2, share_limit(result.report.levels.back().valid_share), 1e-5,
-                        plan, result.rig, result.rig));
-    } else {
-        shift = ordinary_shift(result.rig, farthest);
-        images = with_shifted_depth(images, shift);
-        result.rig = with_shifted_depth(result.rig, shift);
-    }
-    relative.shift += shift;
-    result.rig.relative_depth = relative;
-}
-
 // The footage, and how it is looked at in one attempt: sources that a mount mirrors are flipped, so
 // that nothing within knows of mirrors.
 struct Attempt {
-    WorkingImages images;
+    std::shared_ptr<const WorkingImages> images;
     Plan plan;
     std::optional<Rig> initial;
 
-    Attempt(const WorkingImages& all, const Plan& base, const std::optional<Rig>& given,
-            const Mount& mount)
-        : images(mount.mirrored ? with_mirrored_sources(all) : all), plan(base), initial(given) {
+    Attempt(const std::shared_ptr<const WorkingImages>& all, const Plan& base,
+            const std::optional<Rig>& given, const Mount& mount)
+        : images(all), plan(base), initial(given) {
         plan.mount = mount;
         if (!mount.mirrored) return;
+        images = std::make_shared<WorkingImages>(with_mirrored_sources(*all));
         if (plan.options.source_camera)
             plan.options.source_camera = base.options.source_camera->flipped();
         if (given) initial = with_flipped_source(*given);
@@ -112,16 +93,38 @@ struct Attempt {
     Rig given(const Rig& rig) const { return plan.mount.mirrored ? with_flipped_source(rig) : rig; }
 };
 
+// Estimates the shift of relative depth; images and rig are then those of the shifted depth.
+void settle_relative_depth(Attempt& attempt, CalibrationResult& result) {
+    const Plan& plan = attempt.plan;
+    const double farthest = farthest_inverse_depth(*attempt.images);
+    RelativeDepth relative = *plan.options.relative_depth;
+    const bool known = plan.options.source_camera.has_value();
+    const double shift = known ? best_shift(*attempt.images, plan, farthest, result.rig)
+                               : ordinary_shift(result.rig, farthest);
+    attempt.images = std::make_shared<WorkingImages>(with_shifted_depth(*attempt.images, shift));
+    if (known) {
+        const Level level = make_level(*attempt.images, 1, result.rig, plan.options.num_threads);
+        result.report.levels.push_back(
+            solve_level(level, {}, 2, share_limit(result.report.levels.back().valid_share), 1e-5,
+                        plan, result.rig, result.rig));
+    } else {
+        result.rig = with_shifted_depth(result.rig, shift);
+    }
+    relative.shift += shift;
+    result.rig.relative_depth = relative;
+}
+
 // From a rig to a result: what is left once it is solved.
 void settle(Attempt& attempt, CalibrationResult& result) {
     CalibrationReport& report = result.report;
-    if (attempt.plan.options.relative_depth)
-        settle_relative_depth(attempt.plan, attempt.images, result);
+    if (attempt.plan.options.relative_depth) settle_relative_depth(attempt, result);
     report.nec = report.levels.back().nec;
     report.valid_share = report.levels.back().valid_share;
-    judge(attempt.images, result.rig, attempt.plan, report);
+    judge(*attempt.images, result.rig, attempt.plan, report);
     result.converged = report.converged;
     result.rig = attempt.given(result.rig);
+    const std::string mount = Mount::of(result.rig).text();
+    if (mount != Mount{}.text()) report.message += "; the source image is " + mount;
     for (CandidateReport& candidate : report.candidates) {
         candidate.found = attempt.given(candidate.found);
         candidate.refined = attempt.given(candidate.refined);
@@ -134,15 +137,16 @@ struct Turned {
     Attempt attempt;
     Start start;
 };
-std::optional<Turned> best_turned(const WorkingImages& images, const ImageView& reference,
-                                  const ImageView& source, const Plan& plan, const Start& upright) {
+std::optional<Turned> best_turned(const std::shared_ptr<const WorkingImages>& images,
+                                  const ImageView& reference, const ImageView& source,
+                                  const Plan& plan, const Start& upright) {
     constexpr std::size_t kMounts = 2;
     constexpr double kClearly = 1.15;
     std::optional<Turned> best;
     double merit = kClearly * upright.merit;
-    for (const Mount& mount : find_mounts(images, reference, source, plan, kMounts)) {
+    for (const Mount& mount : find_mounts(*images, reference, source, plan, kMounts)) {
         Attempt attempt(images, plan, std::nullopt, mount);
-        Start start = find_start(attempt.images, reference, source, std::nullopt, attempt.plan,
+        Start start = find_start(*attempt.images, reference, source, std::nullopt, attempt.plan,
                                  [](double) {});
         if (start.merit <= merit) continue;
         merit = start.merit;
@@ -171,10 +175,10 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     result.report.frames =
         draw_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
     tell("prepare", 0.0);
-    const WorkingImages images =
-        make_working_images(references, sources, depths, result.report.frames, plan);
-    result.report.working_width = images.references[0].width;
-    result.report.working_height = images.references[0].height;
+    const auto images = std::make_shared<const WorkingImages>(
+        make_working_images(references, sources, depths, result.report.frames, plan));
+    result.report.working_width = images->references[0].width;
+    result.report.working_height = images->references[0].height;
 
     Mount mount = plan.mount;
     if (initial) mount.mirrored = initial->source_mirrored;
@@ -184,30 +188,30 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
         tell("refine", 0.05);
         result.rig = given_start(references[0], sources[0], attempt.initial, attempt.plan.options);
         solve_adam(
-            attempt.images, attempt.plan, [&](double share) { tell("refine", 0.05 + 0.9 * share); },
-            result.rig, result.report);
+            *attempt.images, attempt.plan,
+            [&](double share) { tell("refine", 0.05 + 0.9 * share); }, result.rig, result.report);
         settle(attempt, result);
     } else {
         tell("search", 0.05);
         const Start found =
-            find_start(attempt.images, references[0], sources[0], attempt.initial, attempt.plan,
+            find_start(*attempt.images, references[0], sources[0], attempt.initial, attempt.plan,
                        [&](double share) { tell("search", 0.05 + 0.55 * share); });
         search_seconds = found.search_seconds;
         const CalibrationResult empty = result;
-        refine(attempt.images, found, attempt.plan, tell, result);
+        refine(*attempt.images, found, attempt.plan, tell, result);
         settle(attempt, result);
         if (!result.converged && plan.searches && !initial && !options.mount) {
             tell("mount", 0.96);
             if (auto turned = best_turned(images, references[0], sources[0], plan, found)) {
                 result = empty;
-                refine(turned->attempt.images, turned->start, turned->attempt.plan, tell, result);
+                refine(*turned->attempt.images, turned->start, turned->attempt.plan, tell, result);
                 settle(turned->attempt, result);
             }
         }
     }
     tell("judge", 1.0);
     result.report.seconds = seconds_now() - start;
-    result.report.time = images.times->seconds(resolve_threads(options.num_threads));
+    result.report.time = images->times->seconds(resolve_threads(options.num_threads));
     result.report.time.search = search_seconds;
     return result;
 }
