@@ -1,19 +1,24 @@
-"""The kernels' figures beside what the machine can do, and the picture of it.
+"""Each C++ kernel alone, beside what the machine can do: runs bench/cpp, makes its table and picture.
 
-    roofline.py [results.json [picture.svg]]
-
-Arithmetic is counted by hand, below, as the equations ask for it, not as a compiler does it: so a
-kernel that finds a way around some of it comes out better. Bytes are what a kernel must read and
-write at least, as bench/cpp/kernels.cpp counts them. One thread.
+Arithmetic is counted by hand, below, as the equations ask for it and not as a compiler does it, so
+a kernel that avoids some of it looks better. Bytes are what a kernel must read and write at least,
+as bench/cpp/kernels.cpp counts them. One thread.
 """
 
+import io
 import json
-import sys
+import subprocess
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pages
+from common import ROOT, machine
+from figures import details, skipped
+
+PROGRAM = ROOT / "build" / "bench" / "cpp" / "bench" / "cpp" / "xcalib_bench"
 
 # Additions, multiplications, divisions and roots of one pixel, each counted as one; comparisons,
 # conversions, loads and table look-ups as none.
@@ -58,138 +63,139 @@ def flops_per_pixel(kernel: str, edges: float) -> float | None:
     return None  # the search: transforms of many sizes
 
 
-def samples(kernels: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
-    """The repetitions of each benchmark, which ran in turns; in the order of kernels.cpp."""
-    found: dict[str, list[dict[str, Any]]] = {}
-    for entry in sorted(kernels["benchmarks"], key=lambda entry: entry["family_index"]):
-        if entry["run_type"] == "iteration":
-            found.setdefault(entry["run_name"], []).append(entry)
+# -- Measuring -----------------------------------------------------------------------------------
+
+
+def measured() -> dict[str, Any]:
+    """`software`, what the program was built with, and `kernels`: see `samples`."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "kernels.json"
+        subprocess.run(
+            [
+                *(str(PROGRAM), f"--benchmark_out={out}", "--benchmark_out_format=json"),
+                *("--benchmark_repetitions=7", "--benchmark_min_time=0.15"),
+                "--benchmark_enable_random_interleaving=true",
+                "--benchmark_display_aggregates_only=true",
+            ],
+            check=True,
+        )
+        written = json.loads(out.read_text())
+    wanted = ("highway_target", "compiler", "Ceres", "Eigen", "OpenCV")
+    return {
+        "software": {key: written["context"][key] for key in wanted},
+        "kernels": samples(written["benchmarks"]),
+    }
+
+
+def samples(entries: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Of each kernel: processor time of a call by repetition [ms], pixels and bytes of a call.
+
+    Where it applies, also the share of pixels with an edge, and flops a second by repetition. In
+    the order of kernels.cpp; `entries` are Google Benchmark's, whose repetitions ran in turns.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for entry in sorted(entries, key=lambda entry: entry["family_index"]):
+        if entry["run_type"] != "iteration":
+            continue
+        constant = {k: entry[k] for k in ("pixels", "bytes", "edge_share") if k in entry}
+        kernel = found.setdefault(entry["run_name"], {**constant, "ms": []})
+        kernel["ms"].append(entry["cpu_time"])
+        if "flops" in entry:
+            kernel.setdefault("flops", []).append(entry["flops"])
     return found
 
 
-def median(entries: list[dict[str, Any]], key: str) -> float:
-    return float(np.median([entry[key] for entry in entries]))
+# -- Reading -------------------------------------------------------------------------------------
 
 
-def copies(found: dict[str, list[dict[str, Any]]]) -> dict[int, float]:
+def rate(kernel: dict[str, Any], of: str) -> float:
+    """Bytes or pixels a second, median."""
+    return float(np.median(1e3 * kernel[of] / np.array(kernel["ms"])))
+
+
+def copies(kernels: dict[str, Any]) -> dict[int, float]:
     """Bytes a second, by the bytes of a copy."""
     return {
-        int(name.split("/")[1]): median(entries, "bytes_per_second")
-        for name, entries in found.items()
+        int(kernel["bytes"]): rate(kernel, "bytes")
+        for name, kernel in kernels.items()
         if name.startswith("copy/")
     }
 
 
-def roofs(found: dict[str, list[dict[str, Any]]]) -> tuple[float, float, float]:
+def roofs(kernels: dict[str, Any]) -> tuple[float, float, float]:
     """Flops a second; bytes a second of a copy as large as the kernels', and of one of 256 MB."""
-    speeds = copies(found)
+    speeds = copies(kernels)
     largest = max(speeds)
     return (
-        median(found["multiply_add"], "flops"),
+        float(np.median(kernels["multiply_add"]["flops"])),
         float(np.median([speed for size, speed in speeds.items() if size != largest])),
         speeds[largest],
     )
 
 
-def points(found: dict[str, list[dict[str, Any]]]) -> dict[str, tuple[float, float]]:
-    """Flops a byte and flops a second of the kernels that were counted."""
-    out = {}
-    for name, entries in found.items():
-        if "pixels" not in entries[0]:
-            continue
-        flops = flops_per_pixel(name, entries[0].get("edge_share", 0.0))
-        if flops is None:
-            continue
-        pixels, size = entries[0]["pixels"], entries[0]["bytes"]
-        rate = median(entries, "items_per_second")
-        out[name] = (flops * pixels / size, flops * rate)
-    return out
-
-
 @dataclass(frozen=True)
 class Row:
-    """A kernel: times of a call [ms], then what it makes of its bytes and arithmetic."""
+    """A kernel: times of a call [ms], then how well it uses memory and arithmetic."""
 
     name: str
     times: tuple[float, float, float]  # 10, 50, 90 %
     speed: float  # [bytes / s]
     share: float  # of the speed of a copy as large
-    flops: float | None  # [1 / s]
+    flops: float | None  # [1 / s]; None where the arithmetic was not counted
+    intensity: float | None  # [flop / byte]
 
 
-def rows(found: dict[str, list[dict[str, Any]]]) -> list[Row]:
-    speeds, flops, out = copies(found), points(found), []
-    for name, entries in found.items():
-        if "pixels" not in entries[0]:
+def rows(kernels: dict[str, Any]) -> list[Row]:
+    speeds, out = copies(kernels), []
+    for name, kernel in kernels.items():
+        if "pixels" not in kernel:
             continue
-        low, middle, high = np.percentile([e["cpu_time"] for e in entries], [10, 50, 90])
-        speed, size = median(entries, "bytes_per_second"), int(entries[0]["bytes"])
-        beside = speeds[min(speeds, key=lambda s, size=size: abs(s - size))]
-        rate = flops[name][1] if name in flops else None
-        out.append(Row(name, (float(low), float(middle), float(high)), speed, speed / beside, rate))
+        low, middle, high = (float(v) for v in np.percentile(kernel["ms"], [10, 50, 90]))
+        speed = rate(kernel, "bytes")
+        nearest = min(speeds, key=lambda size, kernel=kernel: abs(size - kernel["bytes"]))
+        each = flops_per_pixel(name, kernel.get("edge_share", 0.0))
+        flops = None if each is None else each * rate(kernel, "pixels")
+        intensity = None if each is None else each * kernel["pixels"] / kernel["bytes"]
+        times = low, middle, high
+        out.append(Row(name, times, speed, speed / speeds[nearest], flops, intensity))
     return out
 
 
-def figures_of(kernels: dict[str, Any]) -> list[dict[str, Any]]:
-    """The machine's and the kernels', as figures.py has them."""
-    found = samples(kernels)
-    peak, near, far = roofs(found)
-    out: list[dict[str, Any]] = [
-        {"name": "multiply-adds, one thread", "value": peak / 1e9, "unit": "GFLOP/s"},
-        {"name": "copy, as large as the kernels' data", "value": near / 1e9, "unit": "GB/s"},
-        {"name": "copy, 256 MB", "value": far / 1e9, "unit": "GB/s"},
-    ]
-    for row in rows(found):
-        low, middle, high = row.times
-        out.append({"name": row.name, "value": middle, "unit": "ms", "low": low, "high": high})
-        share = {"name": f"{row.name}, of a copy's speed", "value": 100 * row.share, "unit": "%"}
-        out.append(share)
-    return out
-
-
-def table(kernels: dict[str, Any]) -> str:
-    """The same with a kernel a line, for the page."""
-    found = samples(kernels)
-    peak, near, far = roofs(found)
-    lines = [
+def table(found: dict[str, Any]) -> str:
+    peak, near, far = roofs(found["kernels"])
+    heading = (
         f"Multiply-adds: {peak / 1e9:.0f} GFLOP/s. A copy: {near / 1e9:.1f} GB/s (as many bytes as "
-        f"the kernels', median), {far / 1e9:.1f} GB/s (256 MB).",
-        "",
-        "| kernel | ms | 10-90 % | GB/s | of a copy as large | GFLOP/s |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in rows(found):
+        f"the kernels', median), {far / 1e9:.1f} GB/s (256 MB)."
+    )
+    columns = ["kernel", "ms", "10-90 %", "GB/s", "of a copy as large", "GFLOP/s"]
+    cells = []
+    for row in rows(found["kernels"]):
         low, middle, high = row.times
         flops = "" if row.flops is None else f"{row.flops / 1e9:.1f}"
-        lines.append(
-            f"| {row.name} | {middle:.3g} | {low:.3g} - {high:.3g} | {row.speed / 1e9:.2f} | "
-            f"{row.share:.1%} | {flops} |"
-        )
-    return "\n".join(lines) + "\n"
+        times = f"{middle:.3g}", f"{low:.3g} - {high:.3g}"
+        cells.append([row.name, *times, f"{row.speed / 1e9:.2f}", f"{row.share:.1%}", flops])
+    return f"{heading}\n\n{pages.table(columns, cells)}"
 
 
-def draw(kernels: dict[str, Any], machine: dict[str, Any], path: Path) -> None:
-    """Attainable and attained, log by log."""
+def draw(found: dict[str, Any], cpu: str, path: Path) -> None:
+    """What is attainable and what is attained, both axes logarithmic."""
     import matplotlib as mpl
 
     mpl.use("svg")
     mpl.rcParams |= {"svg.hashsalt": "xcalib", "svg.fonttype": "none", "font.size": 9}
     from matplotlib import pyplot as plt
 
-    found = samples(kernels)
-    peak, near, far = roofs(found)
-    at = points(found)
+    peak, near, far = roofs(found["kernels"])
+    at = {r.name: (r.intensity, r.flops) for r in rows(found["kernels"]) if r.flops is not None}
     figure, axes = plt.subplots(figsize=(8, 5))
     intensity = np.geomspace(0.5, 1000, 200)
     for speed, label, style in ((near, "copy of as many bytes", "-"), (far, "copy, 256 MB", "--")):
         roof = np.minimum(peak, intensity * speed) / 1e9
         axes.plot(intensity, roof, style, color="0.3", label=f"{label}: {speed / 1e9:.1f} GB/s")
-    families = {name.split("/")[0]: None for name in at}
-    markers = dict(zip(families, "osv^D", strict=False))
+    families = list(dict.fromkeys(name.split("/")[0] for name in at))
     for name, (x, y) in at.items():
-        family = name.split("/")[0]
-        colour = f"C{list(families).index(family)}"
-        axes.plot(x, y / 1e9, markers[family], color=colour, label=families[family] or "_")
+        family = families.index(name.split("/")[0])
+        axes.plot(x, y / 1e9, "osv^D"[family % 5], color=f"C{family}")
     for name, (x, y) in at.items():
         if name.startswith("register/") and "/f32/" not in name:
             continue  # they lie among one another; the table has them all
@@ -200,28 +206,25 @@ def draw(kernels: dict[str, Any], machine: dict[str, Any], path: Path) -> None:
     axes.set(xscale="log", yscale="log", xlim=(0.5, 1000))
     axes.set_xlabel("arithmetic intensity [flop / byte]")
     axes.set_ylabel("GFLOP/s, one thread")
-    axes.set_title(f"{machine['cpu']}, {machine['highway_target']}: {peak / 1e9:.0f} GFLOP/s")
+    target = found["software"]["highway_target"]
+    axes.set_title(f"{cpu}, {target}: {peak / 1e9:.0f} GFLOP/s")
     axes.grid(True, which="major", alpha=0.3)
     axes.legend(loc="lower right")
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(path.name + ".part")
-    figure.savefig(beside, format="svg", metadata={"Date": None})
-    beside.replace(path)
+    data = io.BytesIO()
+    figure.savefig(data, format="svg", metadata={"Date": None})
     plt.close(figure)
+    pages.write_whole(path, data.getvalue())
 
 
 def main() -> None:
-    results = Path(sys.argv[1]) if len(sys.argv) > 1 else newest()
-    picture = Path(sys.argv[2] if len(sys.argv) > 2 else "docs/images/roofline.svg")
-    found = json.loads(results.read_text())
-    draw(found["kernels"], found["machine"], picture)
-    print(f"{picture} from {results}")
-
-
-def newest() -> Path:
-    kept = (Path(__file__).parent / "results").glob("*.json")
-    return max(kept, key=lambda path: path.stat().st_mtime)
+    print(machine())
+    if not PROGRAM.is_file():
+        skipped("kernels", "not built (make bench-cpp builds them)")
+        return
+    found = measured()
+    print(table(found))
+    details(found)
 
 
 if __name__ == "__main__":
