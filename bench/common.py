@@ -6,6 +6,7 @@ kuixu/kitti_object_vis (CC BY-NC-SA); motorcycle, Middlebury 2014 as scikit-imag
 flir_adas, two pairs of Tarpit59/thermal-rgb-aligner.
 """
 
+import ast
 import os
 import platform
 import subprocess
@@ -49,6 +50,11 @@ def cpu() -> str:
 def machine() -> str:
     """Processor, cores, commit: what a figure must be printed with."""
     return f"{cpu()}, commit {git('rev-parse', '--short', 'HEAD') or 'unknown'}"
+
+
+def summary(script: Path) -> str:
+    """The first line of a script's docstring: what it measures."""
+    return (ast.get_docstring(ast.parse(script.read_text())) or "").partition("\n")[0]
 
 
 def gray(image: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The night rig: its frames, which of them no fit may see, its depths, and its registered frames."""
+"""The night rig: its frames, which of them no fit may see, its depths, its fits and views."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -20,13 +20,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import pages
-from common import ROOT, cpu, git
+from common import ROOT, cpu, git, summary
 from figures import KEPT_IN
 from speed import kernels
 
@@ -37,61 +36,21 @@ ROOFLINE = ROOT / "docs" / "images" / "roofline.svg"
 PACKAGES = ("numpy", "opencv-python-headless", "onnxruntime", "scipy", "torch", "matplotlib")
 
 
-@dataclass(frozen=True)
-class Benchmark:
-    """FOLDER/NAME.py."""
-
-    folder: str
-    measures: str
-    published: bool = False
-    """It has a table in docs/performance.md."""
+def scripts(folder: str, *names: str) -> dict[str, Path]:
+    return {name: BENCH / folder / f"{name}.py" for name in names}
 
 
-BENCHMARKS = {
-    "kernels": Benchmark(
-        "speed", "each C++ kernel alone, beside a copy and the machine's multiply-adds", True
-    ),
-    "register_frame": Benchmark(
-        "speed", "registering a frame, beside numpy + cv2.remap, PyTorch and a copy", True
-    ),
-    "calibration_time": Benchmark(
-        "speed", "a calibration beside the paper's Adam in PyTorch; time and memory by size", True
-    ),
-    "night_rig": Benchmark(
-        "accuracy", "the night rig: fitted on 32 frames, judged on 8 others", True
-    ),
-    "flir_rig": Benchmark(
-        "accuracy", "another real rig, two pairs, a road plane for depth, no initial guess", True
-    ),
-    "depth_measured": Benchmark(
-        "accuracy", "depth from a stereo pair beside the truth; lidar points that are hidden", True
-    ),
-    "stream": Benchmark(
-        "speed", "`register` on 10,000 frames: frames a second, memory, gain by overlapping stages"
-    ),
-    "synthetic_rigs": Benchmark(
-        "accuracy", "100 random rendered rigs, no initial guess: how many are found, and how well"
-    ),
-    "depth_completion": Benchmark(
-        "accuracy", "filling depth: known pixels are hidden, filled and compared, by five methods"
-    ),
-    "depth_conditioning": Benchmark(
-        "accuracy", "noise and flicker of depth along a rendered drive, as it is and steadied"
-    ),
-    "depth_sources": Benchmark("accuracy", "the night rig by where its depth is from"),
-    "patch_flow": Benchmark(
-        "accuracy", "the built-in patch flow: error and time, on rendered and real pairs"
-    ),
-    "flow_term": Benchmark(
-        "accuracy", "what the flow term adds: rigs found and their error, by solver and search"
-    ),
-    "frame_choice": Benchmark(
-        "accuracy", "frames chosen by their content beside a blind draw, on the night rig"
-    ),
-    "clock_offset": Benchmark(
-        "accuracy", "the clock offset of two cameras, from footage alone and by registration"
-    ),
-}
+# What each measures is the first line of its docstring. bench/experiments has a list of its own.
+PUBLISHED = (  # each has its table in docs/performance.md
+    scripts("speed", "kernels", "register_frame", "calibration_time")
+    | scripts("accuracy", "night_rig", "flir_rig", "depth_measured")
+)
+OTHERS = scripts("speed", "stream") | scripts(
+    "accuracy",
+    *("synthetic_rigs", "depth_sources", "depth_completion", "depth_conditioning", "patch_flow"),
+    *("flow_term", "frame_choice", "clock_offset"),
+)
+ALL = PUBLISHED | OTHERS
 
 
 def commit() -> str:
@@ -116,7 +75,7 @@ def software() -> dict[str, str]:
 
 def run(name: str, options: list[str]) -> tuple[dict[str, Any], bool]:
     """What is kept of it, and whether it came to its end."""
-    print(f"== {name}: {BENCHMARKS[name].measures}", flush=True)
+    print(f"== {name}: {summary(ALL[name])}", flush=True)
     record: dict[str, Any] = {
         "commit": commit(),
         "date": time.strftime("%Y-%m-%d %H:%M", time.gmtime()) + " UTC",
@@ -129,7 +88,7 @@ def run(name: str, options: list[str]) -> tuple[dict[str, Any], bool]:
         kept = Path(folder) / "figures"
         kept.touch()
         done = subprocess.run(
-            [sys.executable, str(BENCH / BENCHMARKS[name].folder / f"{name}.py"), *options],
+            [sys.executable, str(ALL[name]), *options],
             env=os.environ | {KEPT_IN: str(kept), "PYTHONPATH": str(BENCH)},
         )
         lines = [json.loads(line) for line in kept.read_text().splitlines()]
@@ -187,16 +146,15 @@ def software_text(records: dict[str, Any]) -> str:
 
 def markdown(records: dict[str, Any]) -> str:
     parts = [f"# The newest run of each benchmark\n\n{software_text(records)}"]
-    for name in BENCHMARKS:
+    for name, script in ALL.items():
         if name in records:
-            body = section(name, records[name])
-            parts.append(f"\n## {name}: {BENCHMARKS[name].measures}\n{body}")
+            parts.append(f"\n## {name}\n\n{summary(script)}\n{section(name, records[name])}")
     return "".join(parts).rstrip("\n") + "\n"
 
 
 def write_docs(records: dict[str, Any]) -> None:
     """Between the markers of docs/performance.md; what was never run stays as it is."""
-    published = {name: r for name, r in records.items() if BENCHMARKS[name].published}
+    published = {name: records[name] for name in PUBLISHED if name in records}
     for name, record in published.items():
         pages.replace_marked(DOCS, name, section(name, record))
     pages.replace_marked(DOCS, "software", f"\n{software_text(published)}\n")
@@ -205,17 +163,10 @@ def write_docs(records: dict[str, Any]) -> None:
 
 
 def listing() -> str:
-    width = max(map(len, BENCHMARKS))
     lines = []
-    for title, published in (("published", True), ("the others", False)):
-        lines.append(f"{title}:")
-        lines += [
-            f"  {name:<{width}}  {b.folder:<8}  {b.measures}"
-            for name, b in BENCHMARKS.items()
-            if b.published == published
-        ]
-    lines.append("the experiments of docs/results.md: python bench/experiments --help")
-    return "\n".join(lines)
+    for title, some in (("published:", PUBLISHED), ("others:", OTHERS)):
+        lines += [title, *(f"  {name:<18}  {summary(script)}" for name, script in some.items())]
+    return "\n".join([*lines, "experiments of docs/results.md: python bench/experiments --help"])
 
 
 def main() -> int:
@@ -231,7 +182,7 @@ def main() -> int:
     parser.add_argument("--docs", action="store_true")
     parser.add_argument("--docs-only", action="store_true")
     args = parser.parse_args(given)
-    if unknown := set(args.names) - set(BENCHMARKS):
+    if unknown := set(args.names) - set(ALL):
         parser.error(f"no benchmark {', '.join(sorted(unknown))}, expected some of\n{listing()}")
     if options and len(args.names) != 1:
         parser.error(f"{len(args.names)} names before --, expected the one that takes the options")
@@ -245,7 +196,7 @@ def main() -> int:
         write_docs(records)
         return 0
     failed = []
-    for name in args.names or [n for n, b in BENCHMARKS.items() if args.all or b.published]:
+    for name in args.names or (ALL if args.all else PUBLISHED):
         record, whole = run(name, [])
         if not whole:
             failed.append(name)

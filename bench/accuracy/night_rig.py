@@ -1,7 +1,8 @@
-"""The night rig: fitted on 32 frames, judged on the other 8 (sorted, every fifth from the fifth).
+"""The night rig: fitted on 32 frames, judged on 8 others.
 
-Gains are printed twice: against the unregistered source over the whole frame, and over the pixels
-that the registered source covers (the paper's way: one mask for both).
+Held out are every fifth of the sorted frames from the fifth. Gains are printed twice: over the
+unregistered source of the whole frame, and over that source on the pixels that the registered one
+covers (the paper's way: one mask for both).
 """
 
 import argparse
@@ -11,25 +12,24 @@ import time
 import numpy as np
 from common import machine
 from figures import figure
-from night import NightRig, gains, patches
+from judge import gain, mean_score, patch_lengths, scored
+from night import NightRig
 
-from xcalib.depth import PlaneDepth
+from xcalib import metrics
+
+DEPTHS = ("filled", "semi_dense", "completed", "plane")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--depth", default="depth_filled", help="depth_filled, depth or plane")
+    parser.add_argument("--depth", default="filled", choices=DEPTHS)
     args = parser.parse_args()
     print(machine())
     night = NightRig.open()
     if night is None:
         return
 
-    def depth(name: str) -> np.ndarray:
-        if args.depth == "plane":
-            return PlaneDepth()(0, night.visible(name))
-        return night.depth(args.depth, name)
-
+    depth = getattr(night, args.depth)
     for name in night.fitted:  # read before the clock starts
         night.visible(name), night.thermal(name)
     depths = {name: depth(name) for name in night.fitted}
@@ -43,16 +43,22 @@ def main() -> None:
     print(f"t = {result.rig.t.round(4)} m (thermal camera to the right: t_x < 0)")
 
     views = list(night.views(result.rig, depth))
-    whole, same = gains(views), gains(views, same_mask=True)
-    for score in whole:
-        (before, found), (before_same, _) = whole[score], same[score]
-        figure(f"{score} unregistered", before)
-        figure(f"{score} unregistered, where the registered source is", before_same)
-        figure(f"{score} registered", found)
-        figure(f"{score} gain", 100 * (found / before - 1), "%")
-        figure(f"{score} gain, same mask", 100 * (found / before_same - 1), "%")
-    for image in ("unregistered", "registered"):
-        norms = patches(views, image)
+    judged = [scored(view) for view in views]
+    for score in ("NEC", "GC"):
+        figure(f"{score} unregistered", mean_score(judged, "whole", score))
+        covered = mean_score(judged, "before", score)
+        figure(f"{score} unregistered, where the registered source is", covered)
+        figure(f"{score} registered", mean_score(judged, "after", score))
+        figure(f"{score} gain", 100 * gain(judged, score, over="whole"), "%")
+        figure(f"{score} gain, same mask", 100 * gain(judged, score), "%")
+    unregistered = [
+        metrics.patch_residual(view.reference, view.unregistered, view.inside).norms
+        for view in views
+    ]
+    for image, norms in (
+        ("unregistered", np.concatenate(unregistered)),
+        ("registered", patch_lengths(judged)),
+    ):
         low, middle, high = np.percentile(norms, [10, 50, 90])
         figure(f"patch residual, {image}, {len(norms)} patches", middle, "px", low, high)
         figure(f"patch residual, {image}, under 2 px", 100 * np.mean(norms < 2), "%")

@@ -1,7 +1,6 @@
 """The paper's experiments on data at hand, and three more: one command each.
 
-    python bench/experiments 1            # 1 to 9, "rest" (what is left of the residual),
-                                          # "refine" (each frame anew), or "all"
+    python bench/experiments 3            # one of those below, or all
     python bench/experiments 3 --quick    # seconds, on next to nothing: only to see that it runs
 
 Tables (Markdown, CSV) and plots go to a results folder; a full run also rewrites its tables between
@@ -16,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from common import ROOT, machine
+from common import ROOT, machine, summary
 from results import Results
 
 EXPERIMENTS = {
@@ -34,9 +33,17 @@ EXPERIMENTS = {
 }
 
 
+def listing() -> str:
+    folder = Path(__file__).parent
+    return "\n".join(
+        f"  {name:<6}  {summary(folder / f'{module}.py')}" for name, module in EXPERIMENTS.items()
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=f"{__doc__}\n{listing()}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("experiment", choices=[*EXPERIMENTS, "all"])
     parser.add_argument(

@@ -1,8 +1,8 @@
-"""Experiment 4: scales of the translation with Adam, from random starts; the same with Ceres."""
+"""Scales of the translation with Adam, from random starts; the same with Ceres."""
 
 import cv2
 import numpy as np
-from footage import HEIGHT, NEAR, SOURCE_HEIGHT, SOURCE_WIDTH, WIDTH, random_rigs
+from rendered import HEIGHT, NEAR, SOURCE_HEIGHT, SOURCE_WIDTH, WIDTH, random_rigs
 from results import Results
 
 import xcalib

@@ -1,4 +1,4 @@
-"""What a calibration takes: against the paper's Adam in PyTorch, by frames, by pixels, and where.
+"""Time and memory of a calibration: beside the paper's Adam in PyTorch, by frames, by pixels.
 
 Two threads throughout; every run is a process of its own, which measures the fit alone: frames are
 in memory, modules loaded. The peer takes the published 120 steps (15 epochs of 32 frames by 4)

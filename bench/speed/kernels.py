@@ -1,5 +1,6 @@
-"""Each C++ kernel alone, beside what the machine can do: runs bench/cpp, makes its table and picture.
+"""Each C++ kernel alone, beside a copy of as many bytes and the machine's multiply-adds.
 
+`measured` runs the program of bench/cpp; `table` and `draw` (a roofline) present what it found.
 Arithmetic is counted by hand, below, as the equations ask for it and not as a compiler does it, so
 a kernel that avoids some of it looks better. Bytes are what a kernel must read and write at least,
 as bench/cpp/kernels.cpp counts them. One thread.
