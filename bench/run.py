@@ -195,7 +195,7 @@ def main() -> int:
     if args.docs_only:
         write_docs(records)
         return 0
-    failed = []
+    failed, kept = [], []
     for name in args.names or (ALL if args.all else PUBLISHED):
         record, whole = run(name, [])
         if not whole:
@@ -203,9 +203,10 @@ def main() -> int:
         if not whole or not measured(record):
             continue
         records[name] = record
+        kept.append(name)
         pages.write_whole(KEPT, json.dumps(records, indent=1) + "\n")  # so far
         pages.write_whole(KEPT.with_suffix(".md"), markdown(records))
-    print(f"kept in {KEPT.relative_to(ROOT)} and .md")
+    print(f"kept in {KEPT.relative_to(ROOT)} and .md: {', '.join(kept) or 'nothing new'}")
     if args.docs:
         write_docs(records)
     if failed:
