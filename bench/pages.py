@@ -16,11 +16,15 @@ def write_whole(path: Path, data: str | bytes) -> None:
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Raises ValueError where a row has more or fewer cells than there are columns."""
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+
+    def line(cells: Sequence[str]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+    lines = [line(columns), "|" + "---|" * len(columns)]
     for row in rows:
         if len(row) != len(columns):
             raise ValueError(f"a row has {len(row)} cells, expected {len(columns)}: {row}")
-        lines.append("| " + " | ".join(row) + " |")
+        lines.append(line(row))
     return "\n".join(lines) + "\n"
 
 

@@ -27,6 +27,8 @@ def machine_and_package() -> str:
 class Results:
     folder: Path
     experiment: str
+    tables: list[str]
+    """All that the experiment writes."""
     quick: bool
     deadline: float = float("inf")
     """By `time.perf_counter`: no further rig is begun after it."""
@@ -45,6 +47,8 @@ class Results:
 
     def table(self, name: str, columns: list[str], rows: list[list[str]], note: str) -> None:
         """Prints and keeps a table; `note` says what it rests on."""
+        if name not in self.tables:
+            raise ValueError(f"table {name} of experiment {self.experiment}: not in EXPERIMENTS")
         text = f"{pages.table(columns, rows)}\n{note} ({machine_and_package()}.)\n"
         print(f"\n== {self.experiment} {name}\n{text}", flush=True)
         text_csv = io.StringIO()
