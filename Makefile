@@ -88,11 +88,12 @@ $(VENV)/.installed: $(WHEEL_FILES) $(VENV)/.build-requires
 
 # -- Checks ---------------------------------------------------------------------------------------
 
-lint: $(VENV)/.installed $(VENV)/.test-requires | test-packages ## formatting, lint and types
+lint: $(VENV)/.installed $(VENV)/.test-requires | test-packages ## formatting, lint, types, and who includes whom
 	clang-format --dry-run --Werror $(CPP_FILES)
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
+	$(BIN)/python scripts/check_rooms.py
 
 # $(call preset,name,options): configures, builds and tests one of CMakePresets.json.
 define preset

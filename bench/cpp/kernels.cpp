@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "machine.hpp"
-#include "nec_pass.hpp"
+#include "objective/nec_pass.hpp"
 #include "xcalib/edge_map.hpp"
 #include "xcalib/flow.hpp"
 #include "xcalib/gray.hpp"

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "format.hpp"
+#include "base/format.hpp"
 
 namespace xcalib {
 namespace {

@@ -8,7 +8,9 @@
 #include "files.hpp"
 #include "frames.hpp"
 #include "xcalib/calibrate.hpp"
-#include "xcalib/choose.hpp"
+#include "xcalib/depth/fit_plane.hpp"
+#include "xcalib/draw_frames.hpp"
+#include "xcalib/footage/choose.hpp"
 #include "xcalib/rig_file.hpp"
 
 namespace xcalib::cli {
@@ -267,7 +269,7 @@ void run(Arguments a, Console& console) {
 
     const std::vector<int> chosen =
         a.choose == "informed" ? choose_by_content(frames, a, console)
-                               : choose_frames(frames.size(), options.max_frames, options.seed);
+                               : draw_frames(frames.size(), options.max_frames, options.seed);
     Loaded loaded = load(frames, chosen, console);
     const auto sized = [](Pinhole camera, const cv::Mat& image) {
         camera.width = image.cols;

@@ -6,8 +6,8 @@
 #include "files.hpp"
 #include "footage.hpp"
 #include "npy.hpp"
-#include "xcalib/complete_depth.hpp"
-#include "xcalib/steady_depth.hpp"
+#include "xcalib/depth/complete_depth.hpp"
+#include "xcalib/depth/steady_depth.hpp"
 
 namespace xcalib::cli {
 namespace {

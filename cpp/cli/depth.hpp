@@ -8,7 +8,7 @@
 
 #include "options.hpp"
 #include "pictures.hpp"
-#include "xcalib/pairing.hpp"
+#include "xcalib/footage/pairing.hpp"
 
 namespace xcalib::cli {
 

@@ -4,7 +4,7 @@
 #include "commands.hpp"
 #include "files.hpp"
 #include "frames.hpp"
-#include "xcalib/evaluate.hpp"
+#include "xcalib/judge/evaluate.hpp"
 #include "xcalib/rig_file.hpp"
 
 namespace xcalib::cli {

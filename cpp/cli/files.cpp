@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "xcalib/error.hpp"
-#include "xcalib/pairing.hpp"
+#include "xcalib/footage/pairing.hpp"
 
 namespace xcalib::cli {
 

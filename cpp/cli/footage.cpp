@@ -10,7 +10,7 @@
 
 #include "files.hpp"
 #include "video.hpp"
-#include "xcalib/false_colour.hpp"
+#include "xcalib/footage/false_colour.hpp"
 
 namespace xcalib::cli {
 namespace {

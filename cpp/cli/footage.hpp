@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pictures.hpp"
-#include "xcalib/pairing.hpp"
+#include "xcalib/footage/pairing.hpp"
 
 namespace xcalib::cli {
 

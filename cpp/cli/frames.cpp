@@ -2,7 +2,7 @@
 
 #include <set>
 
-#include "xcalib/clock_offset.hpp"
+#include "xcalib/footage/clock_offset.hpp"
 
 namespace xcalib::cli {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "commands.hpp"
 #include "files.hpp"
-#include "xcalib/describe.hpp"
 #include "xcalib/error.hpp"
+#include "xcalib/judge/describe.hpp"
 #include "xcalib/rig_file.hpp"
 
 namespace xcalib::cli {

@@ -9,8 +9,8 @@
 #include "footage.hpp"
 #include "journal.hpp"
 #include "registration.hpp"
-#include "xcalib/complete_depth.hpp"
-#include "xcalib/steady_depth.hpp"
+#include "xcalib/depth/complete_depth.hpp"
+#include "xcalib/depth/steady_depth.hpp"
 
 namespace xcalib::cli {
 namespace {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "xcalib/complete_depth.hpp"
-#include "xcalib/plane_depth.hpp"
+#include "xcalib/depth/complete_depth.hpp"
+#include "xcalib/depth/plane_depth.hpp"
 
 namespace CLI {
 class App;

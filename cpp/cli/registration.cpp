@@ -9,8 +9,8 @@
 
 #include "encoder.hpp"
 #include "files.hpp"
-#include "xcalib/fingerprint.hpp"
-#include "xcalib/overlay.hpp"
+#include "xcalib/footage/fingerprint.hpp"
+#include "xcalib/judge/overlay.hpp"
 
 namespace xcalib::cli {
 namespace {

@@ -14,10 +14,11 @@
 
 #include "arrays.hpp"
 #include "xcalib/calibrate.hpp"
+#include "xcalib/draw_frames.hpp"
 #include "xcalib/error.hpp"
 #include "xcalib/flow.hpp"
 #include "xcalib/gray.hpp"
-#include "xcalib/metrics.hpp"
+#include "xcalib/judge/metrics.hpp"
 #include "xcalib/nec.hpp"
 #include "xcalib/register.hpp"
 #include "xcalib/rig_file.hpp"
@@ -552,7 +553,7 @@ A rig that was calibrated with it has its translation in the unit that the scale
         .def_readonly("converged", &CalibrationResult::converged, "Is it to be trusted?")
         .def_readonly("report", &CalibrationResult::report, "CalibrationReport.");
 
-    m.def("choose_frames", &choose_frames, py::arg("count"), py::arg("max_frames"), py::arg("seed"),
+    m.def("draw_frames", &draw_frames, py::arg("count"), py::arg("max_frames"), py::arg("seed"),
           "Indices of max_frames of count frames, spread over all, drawn with seed; sorted.");
 
     m.def(

@@ -3,9 +3,9 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "xcalib/describe.hpp"
-#include "xcalib/evaluate.hpp"
-#include "xcalib/overlay.hpp"
+#include "xcalib/judge/describe.hpp"
+#include "xcalib/judge/evaluate.hpp"
+#include "xcalib/judge/overlay.hpp"
 
 namespace xcalib {
 namespace {

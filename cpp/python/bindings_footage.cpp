@@ -5,14 +5,14 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "xcalib/choose.hpp"
-#include "xcalib/clock_offset.hpp"
-#include "xcalib/complete_depth.hpp"
-#include "xcalib/false_colour.hpp"
-#include "xcalib/fingerprint.hpp"
-#include "xcalib/pairing.hpp"
-#include "xcalib/plane_depth.hpp"
-#include "xcalib/steady_depth.hpp"
+#include "xcalib/depth/complete_depth.hpp"
+#include "xcalib/depth/fit_plane.hpp"
+#include "xcalib/depth/steady_depth.hpp"
+#include "xcalib/footage/choose.hpp"
+#include "xcalib/footage/clock_offset.hpp"
+#include "xcalib/footage/false_colour.hpp"
+#include "xcalib/footage/fingerprint.hpp"
+#include "xcalib/footage/pairing.hpp"
 
 namespace xcalib {
 namespace {

@@ -10,9 +10,11 @@
 #include <random>
 #include <vector>
 
+#include "objective/projection_derivative.hpp"
 #include "xcalib/camera.hpp"
 #include "xcalib/image.hpp"
 #include "xcalib/nec.hpp"
+#include "xcalib/parameters.hpp"
 #include "xcalib/warp.hpp"
 
 namespace xcalib::testing {

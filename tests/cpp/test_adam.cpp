@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "adam.hpp"
+#include "calibrate/adam.hpp"
 #include "working_scene.hpp"
 
 namespace xcalib {

@@ -17,41 +17,6 @@ using namespace ::xcalib::testing;  // NOLINT: scenes.hpp, refusal.hpp
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// --- The choice of frames
-// -------------------------------------------------------------------------
-
-TEST(ChooseFrames, TakesAllWhereThereAreFew) {
-    EXPECT_EQ(choose_frames(0, 32, 1), std::vector<int>{});
-    EXPECT_EQ(choose_frames(3, 32, 1), (std::vector<int>{0, 1, 2}));
-    EXPECT_EQ(choose_frames(4, 4, 1), (std::vector<int>{0, 1, 2, 3}));
-}
-
-TEST(ChooseFrames, TakesOneOfEachEqualPartOfTheFootage) {
-    for (const auto& [count, chosen] : {std::pair{40, 32}, {1000, 32}, {33, 32}, {7, 2}, {5, 1}})
-        for (std::uint32_t seed = 0; seed < 20; ++seed) {
-            const std::vector<int> frames = choose_frames(count, chosen, seed);
-            ASSERT_EQ(frames.size(), static_cast<std::size_t>(chosen));
-            for (int i = 0; i < chosen; ++i) {
-                EXPECT_GE(frames[i], static_cast<int>(std::floor(double(count) * i / chosen)));
-                EXPECT_LT(frames[i],
-                          static_cast<int>(std::floor(double(count) * (i + 1) / chosen)));
-            }
-            for (int i = 1; i < chosen; ++i) EXPECT_LT(frames[i - 1], frames[i]);  // sorted, unique
-        }
-}
-
-TEST(ChooseFrames, TheSeedDecides) {
-    EXPECT_EQ(choose_frames(500, 16, 3), choose_frames(500, 16, 3));
-    std::set<std::vector<int>> different;
-    for (std::uint32_t seed = 0; seed < 10; ++seed) different.insert(choose_frames(500, 16, seed));
-    EXPECT_EQ(different.size(), 10u);
-}
-
-TEST(ChooseFrames, NonsenseIsRefused) {
-    EXPECT_TRUE(has(refusal([] { choose_frames(-1, 4, 0); }), "-1"));
-    EXPECT_TRUE(has(refusal([] { choose_frames(10, 0, 0); }), "max_frames = 0"));
-}
-
 // --- Options
 // --------------------------------------------------------------------------------------
 

@@ -6,12 +6,14 @@
 #include <string>
 
 #include "refusal.hpp"
+#include "same_rig.hpp"
 #include "scenes.hpp"
 #include "xcalib/camera.hpp"
 
 namespace xcalib {
 namespace {
 
+using ::xcalib::testing::expect_same;
 using ::xcalib::testing::has;
 using ::xcalib::testing::random_rig;
 using ::xcalib::testing::refusal;
@@ -22,23 +24,6 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 const Pinhole kCamera{640, 480, 500, 400, 320, 240, 10};
-
-void expect_same(const Pinhole& a, const Pinhole& b, double tolerance) {
-    EXPECT_EQ(a.width, b.width);
-    EXPECT_EQ(a.height, b.height);
-    EXPECT_NEAR(a.fx, b.fx, tolerance);
-    EXPECT_NEAR(a.fy, b.fy, tolerance);
-    EXPECT_NEAR(a.cx, b.cx, tolerance);
-    EXPECT_NEAR(a.cy, b.cy, tolerance);
-    EXPECT_NEAR(a.skew, b.skew, tolerance);
-}
-
-void expect_same(const Rig& a, const Rig& b, double tolerance) {
-    expect_same(a.reference, b.reference, tolerance);
-    expect_same(a.source, b.source, tolerance);
-    EXPECT_LT((a.R() - b.R()).norm(), tolerance);
-    EXPECT_LT((a.t() - b.t()).norm(), tolerance);
-}
 
 TEST(Camera, ProjectsAPointWorkedOutByHand) {
     // x = 1/4, y = 1/2: u = 500/4 + 10/2 + 320, v = 400/2 + 240.
@@ -187,108 +172,6 @@ TEST(InfiniteHomography, SendsAPixelWhereAPointAMillionKilometresAwayIsSeen) {
         const Eigen::Vector3d far = unproject(rig.reference, x.x(), x.y(), 1e9);
         EXPECT_LT((by_homography - project(rig.source, rig.R() * far + rig.t())).norm(), 1e-6);
     }
-}
-
-TEST(PaperParameters, StartAt45DegreesSquarePixelsAndTheImageCentre) {
-    const Rig rig = rig_from_paper(PaperParameters{}, 640, 480, 320, 256);
-    for (const Pinhole& camera : {rig.reference, rig.source}) {
-        EXPECT_NEAR(camera.hfov(), kPi / 4, 1e-14);
-        EXPECT_NEAR(camera.fy, camera.fx, 1e-10);
-        EXPECT_DOUBLE_EQ(camera.cx, (camera.width - 1) / 2.0);
-        EXPECT_DOUBLE_EQ(camera.cy, (camera.height - 1) / 2.0);
-        EXPECT_EQ(camera.skew, 0);
-    }
-    EXPECT_EQ(rig.R(), Eigen::Matrix3d::Identity());
-    EXPECT_EQ(rig.t(), Eigen::Vector3d::Zero());
-}
-
-TEST(PaperParameters, FocalParametersScaleTheAngleOfView) {
-    PaperParameters parameters;
-    parameters.source.fx = 2;  // twice 45 deg
-    parameters.source.fy = 0.5;
-    const Rig rig = rig_from_paper(parameters, 640, 480, 320, 256);
-    EXPECT_NEAR(rig.source.hfov(), kPi / 2, 1e-14);
-    EXPECT_NEAR(rig.source.vfov(), std::atan(256.0 / 320 * std::tan(kPi / 8)), 1e-14);
-    EXPECT_NEAR(rig.reference.hfov(), kPi / 4, 1e-14);
-}
-
-TEST(PaperParameters, CoarseTranslationWeighsTenTimesTheFine) {
-    EXPECT_EQ(kPaperTranslationScale, 10);
-    PaperParameters parameters;
-    parameters.translation.col(0) = Eigen::Vector3d(1, 2, 3);
-    parameters.translation.col(1) = Eigen::Vector3d(0.1, 0.2, -0.3);
-    const Rig rig = rig_from_paper(parameters, 640, 480, 320, 256);
-    EXPECT_LT((rig.t() - Eigen::Vector3d(2, 4, 0)).norm(), 1e-14);
-}
-
-TEST(PaperParameters, QuaternionsOfAnyNormAreTheSameRotation) {
-    PaperParameters parameters;
-    Eigen::Matrix3d quarter_turn;  // about z: x becomes y
-    quarter_turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-    for (const double norm : {1e-3, 1.0, 7.5, -2.0}) {
-        parameters.quaternion = norm * Eigen::Vector4d(1, 0, 0, 1);
-        const Rig rig = rig_from_paper(parameters, 640, 480, 320, 256);
-        EXPECT_LT((rig.R() - quarter_turn).norm(), 1e-14);
-        EXPECT_NEAR(rig.source_from_reference.rotation.norm(), 1, 1e-15);
-    }
-}
-
-TEST(PaperParameters, ConvertBothWays) {
-    std::mt19937 random(4);
-    for (int i = 0; i < 50; ++i) {
-        const Rig rig = random_rig(random, 640, 480, 320, 256);
-        expect_same(rig_from_paper(paper_from_rig(rig), 640, 480, 320, 256), rig, 1e-9);
-
-        PaperParameters parameters = paper_from_rig(rig);
-        parameters.translation.col(1) = Eigen::Vector3d(0.01, -0.02, 0.005);
-        const PaperParameters back = paper_from_rig(rig_from_paper(parameters, 640, 480, 320, 256));
-        EXPECT_NEAR(back.source.fx, parameters.source.fx, 1e-12);
-        EXPECT_NEAR(back.source.fy, parameters.source.fy, 1e-12);
-        EXPECT_NEAR(back.reference.cx, parameters.reference.cx, 1e-12);
-        EXPECT_NEAR(back.reference.cy, parameters.reference.cy, 1e-12);
-        EXPECT_NEAR(back.reference.skew, parameters.reference.skew, 1e-12);
-        EXPECT_LT((back.quaternion - parameters.quaternion).norm(), 1e-12);
-        EXPECT_LT(
-            (back.translation.col(0) - parameters.translation * Eigen::Vector3d(1, 10, 100)).norm(),
-            1e-12);
-    }
-}
-
-TEST(SolverParameters, AreDimensionless) {
-    const Rig rig{kCamera, Pinhole::from_hfov(320, 256, kPi / 2), {}};
-    const SolverParameters p = solver_from_rig(rig);
-    EXPECT_DOUBLE_EQ(p.reference.log_f[0], std::log(500.0 / 640));
-    EXPECT_DOUBLE_EQ(p.reference.log_f[1], std::log(400.0 / 480));
-    EXPECT_DOUBLE_EQ(p.reference.center[0], 320.5 / 640);
-    EXPECT_DOUBLE_EQ(p.reference.center[1], 240.5 / 480);
-    EXPECT_DOUBLE_EQ(p.reference.skew[0], 10.0 / 640);
-    EXPECT_NEAR(p.source.log_f[0], std::log(0.5), 1e-15);
-    EXPECT_DOUBLE_EQ(p.source.center[0], 0.5);
-    EXPECT_EQ(p.quaternion[0], 1);
-}
-
-TEST(SolverParameters, ConvertBothWays) {
-    std::mt19937 random(5);
-    for (int i = 0; i < 50; ++i) {
-        const Rig rig = random_rig(random, 640, 480, 320, 256);
-        expect_same(rig_from_solver(solver_from_rig(rig), 640, 480, 320, 256), rig, 1e-9);
-    }
-}
-
-TEST(SolverParameters, AreTheSameAtEveryPyramidLevel) {
-    std::mt19937 random(6);
-    const Rig rig = random_rig(random, 640, 480, 320, 256);
-    const Rig small = rig.resized(80, 60, 53, 43);
-    expect_same(rig_from_solver(solver_from_rig(rig), 80, 60, 53, 43), small, 1e-10);
-    expect_same(rig_from_solver(solver_from_rig(small), 640, 480, 320, 256), rig, 1e-9);
-}
-
-TEST(SolverParameters, AQuaternionOffTheSphereIsNormalized) {
-    SolverParameters p = solver_from_rig(Rig{kCamera, kCamera, {}});
-    p.quaternion[3] = 1;  // (1, 0, 0, 1): a quarter turn about z
-    const Rig rig = rig_from_solver(p, 640, 480, 640, 480);
-    EXPECT_NEAR(rig.source_from_reference.rotation.norm(), 1, 1e-15);
-    EXPECT_LT((rig.R() * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-14);
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include "refusal.hpp"
 #include "views.hpp"
-#include "xcalib/clock_offset.hpp"
+#include "xcalib/footage/clock_offset.hpp"
 
 namespace xcalib {
 namespace {

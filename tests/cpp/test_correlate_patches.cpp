@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
-#include "correlate_patches.hpp"
 #include "every_target.hpp"
+#include "objective/correlate_patches.hpp"
 
 namespace xcalib {
 namespace {

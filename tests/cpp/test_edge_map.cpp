@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "image_pair.hpp"
+#include "objective/image_pair.hpp"
 #include "scenes.hpp"
 #include "xcalib/edge_map.hpp"
 
@@ -104,7 +104,8 @@ TEST(EdgePair, GradientIsThatOfTheValue) {
     for (unsigned seed = 1; seed <= 3; ++seed) {
         const EdgeScene scene = edge_scene(seed);
         const Rig rig = turned(scene.truth, {0.004, -0.006, 0.01});
-        const Eigen::VectorXd found = scene.pair.normal_equations(rig, kNumParameters).gradient;
+        const Eigen::VectorXd found =
+            scene.pair.normal_equations(rig, Parameters(kNumParameters)).gradient;
         for (int p = 0; p < kNumParameters; ++p) {
             // Averaged over the step, as in test_nec.cpp: interpolation has kinks.
             const double step = 0.7 / farthest_move(rig, p);
@@ -114,7 +115,7 @@ TEST(EdgePair, GradientIsThatOfTheValue) {
                 analytic +=
                     scene.pair
                         .normal_equations(moved(rig, p, step * ((2 * i + 1.0) / kSamples - 1)),
-                                          kNumParameters)
+                                          Parameters(kNumParameters))
                         .gradient[p] /
                     kSamples;
             const double numeric = (scene.pair.evaluate(moved(rig, p, -step)).nec -
@@ -130,7 +131,8 @@ TEST(EdgePair, ValueOfTheNormalEquationsIsTheValue) {
     const EdgeScene scene = edge_scene(5);
     const Rig rig = turned(scene.truth, {0.01, 0.02, -0.01});
     const NecValue cheap = scene.pair.evaluate(rig);
-    const NecNormalEquations full = scene.pair.normal_equations(rig, kNumWithoutReference);
+    const NecNormalEquations full =
+        scene.pair.normal_equations(rig, Parameters(kNumWithoutReference));
     EXPECT_NEAR(full.value.nec, cheap.nec, 1e-6);
     EXPECT_NEAR(full.value.norm, cheap.norm, 1e-6 * cheap.norm);
     EXPECT_NEAR(full.value.valid_share, cheap.valid_share, 1e-6);

@@ -2,7 +2,7 @@
 
 #include <fstream>
 
-#include "xcalib/fingerprint.hpp"
+#include "xcalib/footage/fingerprint.hpp"
 
 namespace xcalib {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "flow_term.hpp"
 #include "refusal.hpp"
-#include "solve.hpp"
+#include "solve/flow_term.hpp"
+#include "solve/solve.hpp"
 #include "working_scene.hpp"
 
 namespace xcalib {
@@ -36,7 +36,7 @@ TEST(FlowTerm, GradientAgreesWithCentralDifferences) {
     std::mt19937 random(1);
     const Rig rig = some_rig(random);
     const FlowTargets targets = random_targets(random, rig, 3);
-    const FlowEquations equations = flow_equations(targets, rig, kNumParameters);
+    const FlowEquations equations = flow_equations(targets, rig, Parameters(kNumParameters));
     EXPECT_NEAR(equations.value, flow_value(targets, rig), 1e-12);
     for (int p = 0; p < kNumParameters; ++p) {
         const double step = 1e-2 / farthest_move(rig, p);
@@ -45,7 +45,7 @@ TEST(FlowTerm, GradientAgreesWithCentralDifferences) {
             (2 * step);
         EXPECT_NEAR(equations.gradient[p], expected, 1e-4 * equations.gradient.norm()) << p;
     }
-    const FlowEquations fewer = flow_equations(targets, rig, kNumWithoutReference);
+    const FlowEquations fewer = flow_equations(targets, rig, Parameters(kNumWithoutReference));
     EXPECT_LT((fewer.hessian -
                equations.hessian.topLeftCorner(kNumWithoutReference, kNumWithoutReference))
                   .norm(),
@@ -70,7 +70,7 @@ TEST(FlowTerm, WhatIsBehindTheSourceHasNoSay) {
     Rig rig = some_rig(random);
     const FlowTargets targets = random_targets(random, rig, 3);
     rig.source_from_reference.translation.z() = -100;
-    const FlowEquations equations = flow_equations(targets, rig, kNumParameters);
+    const FlowEquations equations = flow_equations(targets, rig, Parameters(kNumParameters));
     EXPECT_EQ(equations.value, 0);
     EXPECT_EQ(equations.gradient.norm(), 0);
 }
@@ -80,7 +80,7 @@ TEST(FlowTerm, TheCostWithDerivativesIsTheCostWithout) {
     const Rig rig = some_rig(random);
     for (const double spread : {0.01, 0.3, 3.0, 30.0}) {
         const FlowTargets targets = random_targets(random, rig, spread);
-        const FlowCost cost(targets, 2.5, true);
+        const FlowCost cost(targets, 2.5, Parameters(kNumParameters));
         SolverParameters p = solver_from_rig(rig);
         std::vector<const double*> blocks;
         std::vector<std::vector<double>> storage;

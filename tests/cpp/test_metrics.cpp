@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "scenes.hpp"
-#include "xcalib/metrics.hpp"
+#include "xcalib/judge/metrics.hpp"
 
 namespace xcalib {
 namespace {

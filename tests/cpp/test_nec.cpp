@@ -107,7 +107,7 @@ TEST(MeanGradient, OfTheWarpedSourceIsOverPixelsWhoseStencilIsValid) {
 TEST(Nec, HalfTheSumOfSquaresIsOneMinusNec) {
     for (unsigned seed = 1; seed <= 4; ++seed) {
         const Scene scene = smooth_scene(seed);
-        const NecRows rows = nec_rows(scene.frame, scene.rig, kNumParameters);
+        const NecRows rows = nec_rows(scene.frame, scene.rig, Parameters(kNumParameters));
         const double nec = evaluate_nec(scene.frame, scene.rig).nec;
         EXPECT_GT(nec, 0.3);
         EXPECT_LT(nec, 0.98);
@@ -119,9 +119,9 @@ TEST(Nec, NormalEquationsAreThoseOfTheRows) {
     for (const int count : {int{kNumWithoutReference}, int{kNumParameters}})
         for (unsigned seed = 1; seed <= 4; ++seed) {
             const Scene scene = smooth_scene(seed, 80, 60);
-            const NecRows rows = nec_rows(scene.frame, scene.rig, count);
+            const NecRows rows = nec_rows(scene.frame, scene.rig, Parameters(count));
             const NecNormalEquations equations =
-                nec_normal_equations(scene.frame, scene.rig, count);
+                nec_normal_equations(scene.frame, scene.rig, Parameters(count));
             ASSERT_EQ(rows.jacobian.cols(), count);
             ASSERT_EQ(equations.hessian.rows(), count);
             ASSERT_GT(rows.jacobian.rows(), 500);
@@ -135,8 +135,9 @@ TEST(Nec, NormalEquationsAreThoseOfTheRows) {
 
 TEST(Nec, TheReferencesParametersComeAfterTheOthersAndChangeNothingThere) {
     const Scene scene = smooth_scene(5, 80, 60);
-    const auto some = nec_normal_equations(scene.frame, scene.rig, kNumWithoutReference);
-    const auto all = nec_normal_equations(scene.frame, scene.rig, kNumParameters);
+    const auto some =
+        nec_normal_equations(scene.frame, scene.rig, Parameters(kNumWithoutReference));
+    const auto all = nec_normal_equations(scene.frame, scene.rig, Parameters(kNumParameters));
     constexpr int n = kNumWithoutReference;
     EXPECT_LT(relative_error(all.hessian.topLeftCorner(n, n), some.hessian), 1e-12);
     EXPECT_LT(relative_error(all.gradient.head(n), some.gradient), 1e-12);
@@ -165,7 +166,7 @@ TEST(Nec, GradientAgreesWithCentralDifferencesPerParameterClass) {
                 double sum = 0;
                 for (int i = 0; i < kSamples; ++i) {
                     const Rig rig = moved(pair.rig, p, step * ((2 * i + 1.0) / kSamples - 1));
-                    sum += nec_normal_equations(pair.frame, rig, p + 1).gradient[p];
+                    sum += nec_normal_equations(pair.frame, rig, Parameters(p + 1)).gradient[p];
                 }
                 found(p, scene) = sum / kSamples;
             }
@@ -192,7 +193,7 @@ TEST(Nec, GradientHoldsOnAverageWhereEdgesComeAndGo) {
         constexpr int kSamples = 400;
         for (int i = 0; i < kSamples; ++i) {
             const Rig rig = rig_at(reach * (i + 0.5) / kSamples);
-            integral += nec_normal_equations(scene.frame, rig, kNumWithoutReference)
+            integral += nec_normal_equations(scene.frame, rig, Parameters(kNumWithoutReference))
                             .gradient.segment<3>(kRotationX)
                             .dot(direction) *
                         reach / kSamples;
@@ -209,7 +210,7 @@ TEST(Nec, TheCheapValueIsTheFullOne) {
         const Scene scene = smooth_scene(seed, 80, 60);
         const NecValue cheap = evaluate_nec(scene.frame, scene.rig);
         const NecValue full =
-            nec_normal_equations(scene.frame, scene.rig, kNumWithoutReference).value;
+            nec_normal_equations(scene.frame, scene.rig, Parameters(kNumWithoutReference)).value;
         EXPECT_NEAR(cheap.nec, full.nec, 1e-7);
         EXPECT_NEAR(cheap.norm, full.norm, 1e-7 * full.norm);
         EXPECT_NEAR(cheap.aligned, full.aligned, 1e-6);
@@ -222,8 +223,8 @@ TEST(Nec, ReversedContrastOfTheSourceChangesNothing) {
     Image reversed = scene.source;
     for (float& value : reversed.pixels) value = 1 - value;
     const NecFrame frame = make_nec_frame(scene.reference, reversed, scene.depth, scene.rig);
-    const auto one = nec_normal_equations(scene.frame, scene.rig, kNumParameters);
-    const auto other = nec_normal_equations(frame, scene.rig, kNumParameters);
+    const auto one = nec_normal_equations(scene.frame, scene.rig, Parameters(kNumParameters));
+    const auto other = nec_normal_equations(frame, scene.rig, Parameters(kNumParameters));
     EXPECT_NEAR(one.value.nec, other.value.nec, 1e-5);
     EXPECT_LT(relative_error(other.hessian, one.hessian), 1e-5);
     EXPECT_LT(relative_error(other.gradient, one.gradient), 1e-4);
@@ -246,7 +247,7 @@ TEST(Nec, IsOneWhereTheRigExplainsTheSourceAndLessWhereItDoesNot) {
         EXPECT_LT(nec, last - 0.01);
         last = nec;
     }
-    const auto equations = nec_normal_equations(frame, rig, kNumWithoutReference);
+    const auto equations = nec_normal_equations(frame, rig, Parameters(kNumWithoutReference));
     EXPECT_LT(equations.gradient.norm(), 1e-4 * equations.hessian.norm());
 }
 
@@ -269,8 +270,8 @@ TEST(Nec, PixelsOfUnknownDepthAndTheirStencilsDoNotCount) {
     const NecFrame other = make_nec_frame(scene.reference, changed, scene.depth, scene.rig);
     EXPECT_EQ(one.source_mean, other.source_mean);
     EXPECT_EQ(evaluate_nec(one, scene.rig).nec, evaluate_nec(other, scene.rig).nec);
-    EXPECT_EQ(nec_normal_equations(one, scene.rig, kNumParameters).hessian,
-              nec_normal_equations(other, scene.rig, kNumParameters).hessian);
+    EXPECT_EQ(nec_normal_equations(one, scene.rig, Parameters(kNumParameters)).hessian,
+              nec_normal_equations(other, scene.rig, Parameters(kNumParameters)).hessian);
     // The same change does count where the depth is known.
     const NecFrame known =
         make_nec_frame(scene.reference, changed, drawn(depth, 120, 90), scene.rig);
@@ -319,7 +320,7 @@ TEST(Nec, ValidShareIsTheCoveredEdgeEnergy) {
 TEST(Nec, WithoutOverlapItIsZeroAndSoAreTheEquations) {
     const Scene scene = smooth_scene(12, 80, 60);
     const Rig away = turned(scene.rig, {0, 2.5, 0});
-    const auto equations = nec_normal_equations(scene.frame, away, kNumParameters);
+    const auto equations = nec_normal_equations(scene.frame, away, Parameters(kNumParameters));
     EXPECT_EQ(equations.value.nec, 0);
     EXPECT_EQ(equations.value.aligned, 0);
     EXPECT_EQ(equations.value.valid_share, 0);

@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
-#include "nec_cost.hpp"
 #include "scenes.hpp"
+#include "solve/nec_cost.hpp"
 
 namespace xcalib {
 namespace {
@@ -91,9 +91,9 @@ TEST(Compress, KeepsTheEquationsOfARealPair) {
     const NecFrame frame = make_nec_frame(drawn(texture, 64, 48), source_view(rig, texture, depth),
                                           drawn(depth, 64, 48), near);
     for (const int count : {int{kNumWithoutReference}, int{kNumParameters}}) {
-        const NecRows rows = nec_rows(frame, near, count);
+        const NecRows rows = nec_rows(frame, near, Parameters(count));
         expect_same_normal_equations({rows.jacobian, rows.residuals});
-        const NecNormalEquations equations = nec_normal_equations(frame, near, count);
+        const NecNormalEquations equations = nec_normal_equations(frame, near, Parameters(count));
         const CompressedBlock block =
             compress(equations.hessian, equations.gradient, 1 - equations.value.nec);
         const Eigen::MatrixXd hessian = rows.jacobian.transpose() * rows.jacobian;
@@ -139,7 +139,7 @@ struct OnePair {
         : parameters(solver_from_rig(rig)), pair(frame) {
         problem.AddResidualBlock(
             new NecCost(pair, rig, weight, 0.0,
-                        with_reference ? kNumParameters : kNumWithoutReference),
+                        Parameters(with_reference ? kNumParameters : kNumWithoutReference)),
             nullptr, NecCost::blocks(parameters));
         problem.SetManifold(parameters.quaternion, new ceres::QuaternionManifold);
     }
@@ -212,7 +212,7 @@ TEST(NecCost, GradientIsThatOfTheNormalEquationsTimesTheWeight) {
     const Scene scene = smooth_scene(1, 1, 80, 60);
     const std::vector<double> found = OnePair(scene.frame, scene.rig, 0.3, true).gradient();
     Eigen::VectorXd expected =
-        0.3 * nec_normal_equations(scene.frame, scene.rig, kNumParameters).gradient;
+        0.3 * nec_normal_equations(scene.frame, scene.rig, Parameters(kNumParameters)).gradient;
     expected.segment<3>(kRotationX) *= 2;  // Ceres' quaternion steps are half the angle
     ASSERT_EQ(found.size(), std::size_t{kNumParameters});
     for (int p = 0; p < kNumParameters; ++p)
@@ -250,7 +250,7 @@ TEST(NecCost, APairThatLosesItsOverlapIsChargedForIt) {
     std::vector<const double*> blocks;
     for (const double* block : NecCost::blocks(p)) blocks.push_back(block);
     const auto cost_with = [&](double minimum_share) {
-        const NecCost cost(images, away, 1.0, minimum_share, false);
+        const NecCost cost(images, away, 1.0, minimum_share, Parameters(kNumWithoutReference));
         std::vector<double> residuals(cost.num_residuals());
         EXPECT_TRUE(cost.Evaluate(blocks.data(), residuals.data(), nullptr));
         double sum = 0;
@@ -265,7 +265,7 @@ TEST(NecCost, APairThatLosesItsOverlapIsChargedForIt) {
 TEST(NecCost, BlocksThatAreNotAskedForMayBeLeftOut) {
     const Scene scene = smooth_scene(7, 1, 80, 60);
     const NecPair images(scene.frame);
-    const NecCost cost(images, scene.rig, 1.0, 0.0, true);
+    const NecCost cost(images, scene.rig, 1.0, 0.0, Parameters(kNumParameters));
     SolverParameters p = solver_from_rig(scene.rig);
     std::vector<const double*> blocks;
     for (const double* block : NecCost::blocks(p)) blocks.push_back(block);

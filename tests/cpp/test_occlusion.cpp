@@ -6,7 +6,7 @@
 
 #include "every_target.hpp"
 #include "refusal.hpp"
-#include "register_rows.hpp"
+#include "register/register_rows.hpp"
 #include "scenes.hpp"
 #include "xcalib/register.hpp"
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "xcalib/pairing.hpp"
+#include "xcalib/footage/pairing.hpp"
 
 namespace xcalib {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "relative_depth.hpp"
+#include "calibrate/relative_depth.hpp"
 #include "working_scene.hpp"
 
 namespace xcalib {

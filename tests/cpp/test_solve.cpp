@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "solve.hpp"
+#include "solve/solve.hpp"
 #include "working_scene.hpp"
 
 namespace xcalib {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "xcalib/steady_depth.hpp"
+#include "xcalib/depth/steady_depth.hpp"
 
 namespace xcalib {
 namespace {

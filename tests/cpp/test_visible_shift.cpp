@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "verdict.hpp"
-#include "visible_shift.hpp"
+#include "calibrate/verdict.hpp"
+#include "calibrate/visible_shift.hpp"
 #include "working_scene.hpp"
 
 namespace xcalib {

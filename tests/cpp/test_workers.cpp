@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "parallel.hpp"
-#include "workers.hpp"
+#include "base/parallel.hpp"
+#include "base/workers.hpp"
 
 namespace xcalib {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "scenes.hpp"
-#include "working_images.hpp"
+#include "solve/working_images.hpp"
 #include "xcalib/gray.hpp"
 
 namespace xcalib::testing {

@@ -38,8 +38,9 @@ struct Pinhole {
 };
 
 struct Pose {
-    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // unit
-    Eigen::Vector3d translation = Eigen::Vector3d::Zero();         // [m]
+    // Unit. Unaligned, so that a user's flags do not change what these structures look like.
+    Eigen::Quaternion<double, Eigen::DontAlign> rotation = decltype(rotation)::Identity();
+    Eigen::Vector3d translation = Eigen::Vector3d::Zero();  // [m]
 };
 
 // Relative inverse depth r, as many networks give it, in metres: D = 1 / (scale r + shift).
@@ -82,47 +83,5 @@ Eigen::Matrix3d infinite_homography(const Rig& rig);
 
 // The source camera turned where it stands, by exp(rotation) about its own axes [rad].
 Rig turn_source(const Rig& rig, const Eigen::Vector3d& rotation);
-
-// The paper's parameterization: unconstrained numbers that are 1 or 0 or 1/2 at its start.
-struct PaperParameters {
-    struct Camera {
-        double fx = 1.0;    // Eq. (focal_lengths)
-        double fy = 1.0;    // Eq. (focal_lengths)
-        double cx = 0.5;    // of the width, from the left edge of the first pixel
-        double cy = 0.5;    // of the height
-        double skew = 0.0;  // [px]
-    };
-    Camera reference;
-    Camera source;
-    Eigen::Vector4d quaternion = Eigen::Vector4d(1, 0, 0, 0);  // w x y z, any norm but 0
-    // Eq. (translation): column k in lambda_t^k m. The paper has the first two, and tries all
-    // three.
-    Eigen::Matrix3d translation = Eigen::Matrix3d::Zero();
-};
-
-inline constexpr double kPaperTranslationScale = 10.0;  // lambda_t
-
-Rig rig_from_paper(const PaperParameters& parameters, int reference_width, int reference_height,
-                   int source_width, int source_height);
-// The translation goes to the finest component whole: the split is not unique.
-PaperParameters paper_from_rig(const Rig& rig);
-
-// The solver's parameterization: every number is dimensionless or in metres, of order one, and the
-// same at every pyramid level.
-struct SolverParameters {
-    struct Camera {
-        double log_f[2];   // log(fx / width), log(fy / height)
-        double center[2];  // (cx + 1/2) / width, (cy + 1/2) / height
-        double skew[1];    // skew / width
-    };
-    Camera reference;
-    Camera source;
-    double quaternion[4];   // w x y z, unit
-    double translation[3];  // [m]
-};
-
-SolverParameters solver_from_rig(const Rig& rig);
-Rig rig_from_solver(const SolverParameters& parameters, int reference_width, int reference_height,
-                    int source_width, int source_height);
 
 }  // namespace xcalib

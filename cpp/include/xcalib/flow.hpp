@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "xcalib/export.hpp"
@@ -39,6 +40,11 @@ struct FlowField {
 // An image smaller than a patch has no confident vector; one smaller than a cell, no vector at all.
 FlowField patch_flow(const Image& reference, const Image& warped, const std::uint8_t* valid,
                      const FlowOptions& options = {}, int num_threads = 0);
+
+// Flow from a reference, gray and normalized, to the warped source, gray too; both in [0, 1] and of
+// one size. `valid`: nonzero where the warped source is. Called from the calling thread.
+using FlowEstimator = std::function<FlowField(const Image& reference, const Image& warped,
+                                              const std::vector<std::uint8_t>& valid)>;
 
 // One channel of a flow field at every pixel of a width x height image: linear between the grid's
 // points, and as the nearest beyond them. `values` is one of the field's vectors.

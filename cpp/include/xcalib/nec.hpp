@@ -13,7 +13,7 @@
 #include "xcalib/camera.hpp"
 #include "xcalib/export.hpp"
 #include "xcalib/image.hpp"
-#include "xcalib/warp.hpp"
+#include "xcalib/parameters.hpp"
 
 namespace XCALIB_EXPORT xcalib {
 

@@ -38,8 +38,8 @@ class Registrar {
     Registrar(Registrar&&) noexcept;
     Registrar& operator=(Registrar&&) noexcept;
 
-    const Rig& rig() const { return rig_; }
-    const RegistrarOptions& options() const { return options_; }
+    const Rig& rig() const;
+    const RegistrarOptions& options() const;
 
     // Source coordinates of each reference pixel, (height x width x 2) floats [px], x then y; NaN
     // where there is none. `depth`: one channel, float32 [m] or uint16 (see depth_scale), 0
@@ -56,11 +56,8 @@ class Registrar {
                         const MutableImageView& registered, std::uint8_t* mask) const;
 
    private:
-    struct Stream;  // what is kept between frames: threads and buffers
+    struct Stream;  // the rig, and what is kept between frames: threads and buffers
 
-    Rig rig_;
-    RegistrarOptions options_;
-    Reprojection reprojection_;
     std::unique_ptr<Stream> stream_;
 };
 

@@ -1,0 +1,64 @@
+// What a calibration found out about itself.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "xcalib/calibration_times.hpp"
+#include "xcalib/camera.hpp"
+#include "xcalib/export.hpp"
+
+namespace XCALIB_EXPORT xcalib {
+
+struct LevelReport {
+    int factor = 1;  // of the reduction of the working images
+    int stage = 1;   // of the paper: 1 with its frozen set and prior, 2 with all free
+    int width = 0, height = 0;
+    int iterations = 0;
+    double initial_cost = 0.0, final_cost = 0.0;  // Eq. (image_loss), plus flow term and prior
+    double nec = 0.0;                             // mean over the pairs, weighted by c_i
+    double aligned = 0.0;                         // the same beyond what chance gives
+    double valid_share = 0.0;       // of the reference's edge energy that the source covers
+    double condition_number = 0.0;  // of the normal equations, columns scaled to unit norm
+    double seconds = 0.0;
+    std::string stopped;  // why
+};
+
+struct CandidateReport {
+    double score = 0.0, correlation = 0.0, overlap = 0.0;  // as the search found it
+    double refined_nec = 0.0;                              // after refinement at the coarse level
+    Rig found;                                             // by the search
+    Rig refined;                                           // after refinement at the coarse level
+};
+
+// A step of Adam, before it is taken: means over its batch.
+struct AdamStep {
+    double learning_rate = 0.0;
+    double image = 0.0;  // Eq. (image_loss)
+    double flow = 0.0;   // of Eq. (flow_loss), in half widths of the reference
+    double prior = 0.0;  // Eq. (camera_regularization)
+    double total = 0.0;  // Eq. (total_loss)
+};
+
+struct CalibrationReport {
+    bool converged = false;
+    std::string message;  // one line: why the result is, or is not, to be trusted
+    double seconds = 0.0;
+    CalibrationTimes time;
+    int working_width = 0, working_height = 0;
+    double nec = 0.0;               // at the finest level
+    double baseline_nec = 0.0;      // at half that size, of the rig turned off its place
+    double contrast = 0.0;          // of the NEC above that, in its deviations over displacements
+    double repeatability_px = 0.0;  // between fits to two halves of the frames [working px]
+    double visible_shift_px = 0.0;  // that flow still sees [working px]; NaN where it cannot tell
+    double valid_share = 0.0;
+    std::vector<int> frames;  // indices of the pairs used
+    std::vector<CandidateReport> candidates;
+    std::vector<LevelReport> levels;
+    std::vector<AdamStep> steps;  // of Solver::adam
+
+    std::string brief() const;  // one line
+    std::string full() const;   // a table
+};
+
+}  // namespace xcalib

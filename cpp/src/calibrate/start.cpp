@@ -1,0 +1,356 @@
+#include "calibrate/start.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "base/parallel.hpp"
+#include "solve/solve.hpp"
+#include "xcalib/search.hpp"
+
+namespace xcalib {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+// A camera of unknown intrinsics but its horizontal field of view.
+Pinhole camera_guess(const ImageView& image, double hfov) {
+    return Pinhole::from_hfov(image.width, image.height, hfov);
+}
+
+SearchSpace search_space(const ImageView& reference, const ImageView& source,
+                         const std::optional<Rig>& initial, const CalibrationOptions& options) {
+    constexpr double kScaleStep = 1.06;
+    constexpr double kRollStep = 4 * kDegree;
+    const bool local = initial && options.search.mode != SearchMode::full;
+    SearchSpace space;
+    space.min_overlap = options.search.min_overlap;
+    space.map_width = options.search.map_width;
+    space.candidates = options.search.candidates;
+
+    std::vector<Pinhole> cameras;
+    if (options.reference_camera) {
+        cameras = {*options.reference_camera};
+    } else if (initial) {
+        cameras = {initial->reference};
+    } else if (options.reference_hfov_deg) {
+        cameras = {camera_guess(reference, *options.reference_hfov_deg * kDegree)};
+    } else {
+        for (double hfov : {60.0, 40.0, 82.0})
+            cameras.push_back(camera_guess(reference, hfov * kDegree));
+    }
+    for (const Pinhole& camera : cameras) {
+        SearchHypothesis hypothesis{camera, {}};
+        if (options.source_camera) {
+            hypothesis.sources = {*options.source_camera};
+        } else {
+            // Fields of view are compared by their tangents, as focal lengths are.
+            const Pinhole& centre = local ? initial->source : camera;
+            const double ratio = local ? 1.15 : options.search.max_fov_ratio;
+            const double widest = std::tan(60 * kDegree);
+            const int steps = static_cast<int>(std::ceil(std::log(ratio) / std::log(kScaleStep)));
+            for (int i = -steps; i <= steps; ++i) {
+                const double scale = std::pow(ratio, static_cast<double>(i) / steps);
+                const double tangent = scale * std::tan(centre.hfov() / 2);
+                if (tangent > widest) continue;
+                Pinhole guess = camera_guess(source, 2 * std::atan(tangent));
+                if (local) {
+                    guess = initial->source;
+                    guess.fx /= scale;
+                    guess.fy /= scale;
+                }
+                hypothesis.sources.push_back(guess);
+            }
+        }
+        space.hypotheses.push_back(hypothesis);
+    }
+    const double max_roll = (local ? 3.0 : options.search.max_roll_deg) * kDegree;
+    const int rolls = static_cast<int>(std::lround(max_roll / kRollStep));
+    for (int i = -rolls; i <= rolls; ++i) space.rolls.push_back(rolls ? i * max_roll / rolls : 0.0);
+    if (local) {
+        space.base = initial->R();
+        space.max_shift = 0.15;
+    }
+    return space;
+}
+
+// What candidates are compared by: how well edges agree beyond chance, and over how much of the
+// image. Chance grows as the overlap shrinks. Of a NecValue or a LevelReport.
+template <class Value>
+double merit(const Value& value) {
+    return value.aligned * std::sqrt(value.valid_share);
+}
+
+// Where the field of view of the reference makes little difference, it is the paper's 45 deg.
+double preference(const Rig& rig) {
+    const double ratio =
+        std::log(rig.reference.width / rig.reference.fx / (2 * std::tan(22.5 * kDegree)));
+    return 1 - 0.12 * std::abs(ratio);
+}
+
+struct Candidate {
+    Rig rig;
+    double merit = 0.0;
+    double share_limit = 0.0;
+    std::size_t entry = 0;  // in the report
+    std::vector<LevelReport> levels;
+};
+
+// Inverse depth where the reference has edges: 10th, 50th and 90th percentile [1/m].
+struct InverseDepths {
+    double low, median, high;
+};
+
+InverseDepths inverse_depths(const ReducedImages& images) {
+    std::vector<double> values;
+    for (std::size_t k = 0; k < images.depths.size(); ++k) {
+        const std::vector<float>& depth = images.depths[k].pixels;
+        double mean = 0;
+        for (const auto& z : images.edges[k].z) mean += std::norm(z);
+        mean /= static_cast<double>(depth.size());
+        for (std::size_t i = 0; i < depth.size(); ++i)
+            if (depth[i] > 0 && std::norm(images.edges[k].z[i]) > mean)
+                values.push_back(1.0 / depth[i]);
+    }
+    if (values.empty()) return {0.0, 0.0, 0.0};
+    std::sort(values.begin(), values.end());
+    const auto at = [&](double share) { return values[std::size_t(share * (values.size() - 1))]; };
+    return {at(0.1), at(0.5), at(0.9)};
+}
+
+// The same rig moved by `t`, and turned so that the middle of the image at the median depth stays
+// where it is: what the search has found is kept, only the parallax changes.
+Rig with_parallax(const Rig& rig, const Eigen::Vector3d& t, double inverse_depth) {
+    const Eigen::Vector3d axis = rig.R() * Eigen::Vector3d::UnitZ();
+    const Eigen::Quaterniond back = Eigen::Quaterniond::FromTwoVectors(
+        axis + t * inverse_depth, axis + rig.t() * inverse_depth);
+    Rig moved = rig;
+    moved.source_from_reference.rotation = (back * rig.source_from_reference.rotation).normalized();
+    moved.source_from_reference.translation = back * t;
+    return moved;
+}
+
+// The same rig with a reference of another focal length: the source's follows, so that the scale
+// stays, and rotation and translation, so that the middle of the image and its parallax do.
+Rig with_reference_focal(const Rig& rig, double factor) {
+    Rig out = rig;
+    out.reference.fx *= factor;
+    out.reference.fy *= factor;
+    out.source.fx *= factor;
+    out.source.fy *= factor;
+    const Eigen::AngleAxisd rotation(rig.source_from_reference.rotation);
+    const Eigen::Vector3d vector = rotation.angle() * rotation.axis();
+    // Roll is an angle in the image; pan and tilt are displacements over the focal length.
+    const Eigen::Vector3d scaled(vector.x() / factor, vector.y() / factor, vector.z());
+    out.source_from_reference.rotation = Eigen::Quaterniond::Identity();
+    out = turn_source(out, scaled);
+    out.source_from_reference.translation = rig.t() / factor;
+    return out;
+}
+
+// Replaces the candidate's rig by the best of `count` variants, if any is better than it.
+template <class Variant>
+void choose_best(const Level& level, int num_threads, int count, const Variant& variant,
+                 Candidate& candidate) {
+    std::vector<double> merits(count);
+    parallel_each(count, num_threads, [&](int i) {
+        const Rig rig = variant(i);
+        merits[i] = preference(rig) * merit(pooled(level, rig, 1));
+    });
+    const int best =
+        static_cast<int>(std::max_element(merits.begin(), merits.end()) - merits.begin());
+    if (merits[best] <= candidate.merit) return;
+    candidate.merit = merits[best];
+    candidate.rig = variant(best);
+}
+
+// The search sees one displacement for all depths, at coarse steps of scale and roll. This looks
+// for the baseline that goes with it, and for what the search has rounded, on grids in turn whose
+// steps are about a pixel of the level.
+void place(const Level& level, const InverseDepths& inverse, bool free_focal,
+           const CalibrationOptions& options, Candidate& candidate) {
+    const double f = level.rig_at(candidate.rig).source.fx;
+    const double half = 0.5 * level.width * f / level.rig_at(candidate.rig).reference.fx;
+    candidate.merit =
+        preference(candidate.rig) * merit(pooled(level, candidate.rig, options.num_threads));
+    for (int round = 0; round < 2; ++round) {
+        if (const double spread = f * (inverse.high - inverse.low); spread > 0) {
+            const double step = 1.5 / spread;
+            constexpr int kReachX = 6, kReachY = 4;  // baselines are mostly level
+            const Rig& from = candidate.rig;
+            choose_best(
+                level, options.num_threads, (2 * kReachX + 1) * (2 * kReachY + 1),
+                [&](int i) {
+                    const int x = i % (2 * kReachX + 1) - kReachX,
+                              y = i / (2 * kReachX + 1) - kReachY;
+                    return with_parallax(from, Eigen::Vector3d(x * step, y * step, 0),
+                                         inverse.median);
+                },
+                candidate);
+        }
+        if (free_focal) {
+            const Rig from = candidate.rig;
+            constexpr int kFocals = 9;  // horizontal fields of view of 27 to 92 deg
+            const double paper = 0.5 / std::tan(22.5 * kDegree);  // 45 deg, in widths
+            choose_best(
+                level, options.num_threads, kFocals,
+                [&](int i) {
+                    const double focal = paper * std::pow(1.2, i - 5);
+                    return with_reference_focal(from,
+                                                focal * from.reference.width / from.reference.fx);
+                },
+                candidate);
+        }
+        constexpr int kReach = 3;
+        const int side = 2 * kReach + 1;
+        const Rig before = candidate.rig;
+        choose_best(
+            level, options.num_threads, side * side,
+            [&](int i) {  // scale and roll
+                Rig rig = before;
+                if (!options.source_camera) {
+                    const double scale = 1 + (i % side - kReach) / half;
+                    rig.source.fx *= scale;
+                    rig.source.fy *= scale;
+                }
+                return turn_source(rig, Eigen::Vector3d(0, 0, (i / side - kReach) / half));
+            },
+            candidate);
+        const Rig after = candidate.rig;
+        choose_best(
+            level, options.num_threads, side * side,
+            [&](int i) {  // pan and tilt
+                return turn_source(
+                    after, Eigen::Vector3d((i / side - kReach) / f, (i % side - kReach) / f, 0));
+            },
+            candidate);
+    }
+}
+
+// Keeps the best `count`, best first.
+void keep_best(std::vector<Candidate>& candidates, std::size_t count) {
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.merit > b.merit; });
+    if (candidates.size() > count) candidates.resize(count);
+}
+
+}  // namespace
+
+std::vector<Step> schedule(int width, int height, const Parts& parts) {
+    constexpr int kSmallestSide = 40;
+    std::vector<Step> steps;
+    if (!parts.pyramid) return {{1, parts.stages ? 1 : 2}, {1, 2}};
+    for (int factor : {8, 4})
+        if (parts.stages && std::min(width, height) / factor >= kSmallestSide)
+            steps.push_back({factor, 1});
+    for (int factor : {4, 2, 1})
+        if (std::min(width, height) / factor >= kSmallestSide || factor == 1)
+            steps.push_back({factor, 2});
+    return steps;
+}
+
+Rig given_start(const ImageView& reference, const ImageView& source,
+                const std::optional<Rig>& initial, const CalibrationOptions& options) {
+    Rig rig;
+    if (initial) {
+        rig = *initial;
+    } else {
+        rig.reference = camera_guess(reference, options.reference_hfov_deg.value_or(45) * kDegree);
+        rig.source = camera_guess(source, 45 * kDegree);
+    }
+    rig.reference = options.reference_camera.value_or(rig.reference);
+    rig.source = options.source_camera.value_or(rig.source);
+    return rig;
+}
+
+Start find_start(const WorkingImages& all_images, const ImageView& reference,
+                 const ImageView& source, const std::optional<Rig>& initial,
+                 const CalibrationOptions& options, const FlowEstimator& flow,
+                 const std::function<void(double)>& progress) {
+    constexpr std::size_t kFrames = 8, kFew = 6;
+    const WorkingImages images = all_images.spread(kFrames);
+    const int num_threads = options.num_threads;
+    const double start = seconds_now();
+    Start out;
+
+    std::vector<SearchCandidate> found;
+    const bool searches = options.search.mode != SearchMode::off;
+    if (searches) {
+        found = global_search(images.reference_edges, images.source_edges,
+                              search_space(reference, source, initial, options), num_threads);
+    } else {
+        SearchCandidate given;
+        given.rig = given_start(reference, source, initial, options);
+        found = {given};
+    }
+    if (found.empty())
+        throw std::runtime_error("the search found no displacement at which the images overlap");
+    out.search_seconds = seconds_now() - start;
+    progress(0.4);
+
+    const std::vector<Step> steps =
+        schedule(images.references[0].width, images.references[0].height, options.parts);
+    const int placing =
+        schedule(images.references[0].width, images.references[0].height, {})[0].factor;
+    const bool focal_free = !initial && !options.reference_camera && !options.reference_hfov_deg &&
+                            !options.source_camera;
+    // Placing costs hundreds of evaluations: fewer frames tell enough.
+    const WorkingImages few = images.spread(kFew);
+    const InverseDepths inverse = inverse_depths(few.pyramid.at(kCoarse));
+    std::vector<Candidate> candidates;
+    for (const SearchCandidate& peak : found) {
+        CandidateReport entry;
+        entry.found = entry.refined = peak.rig;  // until it is refined, if it is
+        entry.score = peak.score;
+        entry.correlation = peak.correlation;
+        entry.overlap = peak.overlap;
+        Candidate candidate;
+        candidate.rig = peak.rig;
+        candidate.entry = out.candidates.size();
+        // The search sees one displacement for all depths: where the middle depth is, it holds with
+        // the given translation too.
+        if (searches && initial)
+            candidate.rig = with_parallax(peak.rig, initial->t(), inverse.median);
+        const Level level = make_level(few, placing, candidate.rig, num_threads);
+        if (searches) place(level, inverse, focal_free, options, candidate);
+        const NecValue value = pooled(level, candidate.rig, num_threads);
+        if (!searches) candidate.merit = merit(value);
+        candidate.share_limit = 0.8 * value.valid_share;
+        candidates.push_back(candidate);
+        out.candidates.push_back(entry);
+    }
+    progress(0.5);
+
+    CalibrationOptions quick = options;  // enough to compare by; the winner is solved in full
+    quick.max_iterations = std::min(options.max_iterations, 30);
+    constexpr double kTolerance = 3e-5;
+
+    // Halving: each level costs four times the last, and tells more.
+    for (std::size_t s = 0; s + 1 < steps.size() || s == 0; ++s) {
+        if (s > 0 && steps[s].factor == 1) break;
+        // Flow is dear, and with one candidate nothing is compared: the refinement does the rest.
+        if (s > 0 && steps[s].stage == 2 && !searches && options.flow != FlowMode::off) break;
+        if (s == 0 || steps[s].factor != steps[s - 1].factor)
+            keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
+        for (Candidate& candidate : candidates) {
+            const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
+            candidate.levels.push_back(
+                searches && options.parts.images
+                    ? solve_level(level, {}, steps[s].stage, candidate.share_limit, kTolerance,
+                                  quick, candidate.rig, candidate.rig)
+                    : solve_stage(images, level, steps[s].stage, candidate.share_limit, kTolerance,
+                                  quick, flow, candidate.rig));
+            candidate.merit = merit(candidate.levels.back());
+            out.candidates[candidate.entry].refined = candidate.rig;
+            out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;
+        }
+        progress(0.5 + 0.5 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
+    }
+    keep_best(candidates, 1);
+    out.rig = candidates[0].rig;
+    out.levels = candidates[0].levels;
+    return out;
+}
+
+}  // namespace xcalib

@@ -1,0 +1,139 @@
+#include "xcalib/camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+#include <stdexcept>
+
+#include "base/format.hpp"
+#include "xcalib/error.hpp"
+
+namespace xcalib {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+void require(bool ok, const char* camera, const char* field, double value, const char* expected) {
+    if (ok) return;
+    std::ostringstream message;
+    message << camera << ": " << field << " = " << value << ", expected " << expected;
+    throw std::invalid_argument(message.str());
+}
+
+}  // namespace
+
+Pinhole Pinhole::from_hfov(int width, int height, double hfov) {
+    require(hfov > 0 && hfov < kPi, "camera", "hfov", hfov, "an angle in (0, pi) rad");
+    Pinhole camera;
+    camera.width = width;
+    camera.height = height;
+    camera.fx = camera.fy = width / (2 * std::tan(hfov / 2));
+    camera.cx = (width - 1) / 2.0;
+    camera.cy = (height - 1) / 2.0;
+    return camera;
+}
+
+Eigen::Matrix3d Pinhole::K() const {
+    Eigen::Matrix3d k;
+    k << fx, skew, cx, 0, fy, cy, 0, 0, 1;
+    return k;
+}
+
+double Pinhole::hfov() const { return 2 * std::atan(width / (2 * fx)); }
+double Pinhole::vfov() const { return 2 * std::atan(height / (2 * fy)); }
+
+Pinhole Pinhole::resized(int new_width, int new_height) const {
+    require(new_width > 0, "resized camera", "width", new_width, "at least 1 px");
+    require(new_height > 0, "resized camera", "height", new_height, "at least 1 px");
+    const double sx = static_cast<double>(new_width) / width;
+    const double sy = static_cast<double>(new_height) / height;
+    Pinhole camera;
+    camera.width = new_width;
+    camera.height = new_height;
+    camera.fx = fx * sx;
+    camera.fy = fy * sy;
+    camera.cx = (cx + 0.5) * sx - 0.5;
+    camera.cy = (cy + 0.5) * sy - 0.5;
+    camera.skew = skew * sx;
+    return camera;
+}
+
+void Pinhole::validate(const char* name) const {
+    require(width > 0, name, "width", width, "at least 1 px");
+    require(height > 0, name, "height", height, "at least 1 px");
+    require(std::isfinite(fx) && fx > 0, name, "fx", fx, "a finite number > 0 px");
+    require(std::isfinite(fy) && fy > 0, name, "fy", fy, "a finite number > 0 px");
+    require(std::isfinite(cx), name, "cx", cx, "a finite number of px");
+    require(std::isfinite(cy), name, "cy", cy, "a finite number of px");
+    require(std::isfinite(skew), name, "skew", skew, "a finite number of px");
+}
+
+Rig Rig::resized(int reference_width, int reference_height, int source_width,
+                 int source_height) const {
+    return {reference.resized(reference_width, reference_height),
+            source.resized(source_width, source_height), source_from_reference, relative_depth};
+}
+
+void RelativeDepth::validate(const char* name) const {
+    require(std::isfinite(scale) && scale > 0, name, "scale", scale, "a finite number > 0");
+    require(std::isfinite(shift), name, "shift", shift, "a finite number");
+}
+
+void Rig::validate() const {
+    reference.validate("reference");
+    source.validate("source");
+    const double norm = source_from_reference.rotation.norm();
+    require(std::isfinite(norm) && std::abs(norm - 1) < 1e-6, "source_from_reference",
+            "norm of the quaternion", norm, "1");
+    for (int i = 0; i < 3; ++i)
+        require(std::isfinite(t()[i]), "source_from_reference", "translation", t()[i],
+                "a finite number of metres");
+    if (relative_depth) relative_depth->validate("relative_depth");
+}
+
+Rig fitted(const Rig& rig, int reference_width, int reference_height, int source_width,
+           int source_height) {
+    const auto same = [](const char* name, const Pinhole& camera, int width, int height) {
+        const long difference = std::labs(static_cast<long>(width) * camera.height -
+                                          static_cast<long>(height) * camera.width);
+        if (difference > std::max(camera.width, camera.height))
+            throw InputError(
+                format("%s images are %dx%d, but the rig's %s camera is %dx%d;"
+                       " expected that size or the same aspect",
+                       name, width, height, name, camera.width, camera.height));
+        return camera.width == width && camera.height == height;
+    };
+    const bool reference = same("reference", rig.reference, reference_width, reference_height);
+    const bool source = same("source", rig.source, source_width, source_height);
+    if (reference && source) return rig;
+    return rig.resized(reference_width, reference_height, source_width, source_height);
+}
+
+Eigen::Vector3d unproject(const Pinhole& camera, double u, double v, double z) {
+    const double y = (v - camera.cy) / camera.fy;
+    const double x = (u - camera.cx - camera.skew * y) / camera.fx;
+    return {x * z, y * z, z};
+}
+
+Eigen::Vector2d project(const Pinhole& camera, const Eigen::Vector3d& x_in_camera) {
+    const double x = x_in_camera.x() / x_in_camera.z();
+    const double y = x_in_camera.y() / x_in_camera.z();
+    return {camera.fx * x + camera.skew * y + camera.cx, camera.fy * y + camera.cy};
+}
+
+Rig turn_source(const Rig& rig, const Eigen::Vector3d& rotation) {
+    const double angle = rotation.norm();
+    if (angle == 0) return rig;
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle, rotation / angle));
+    Rig out = rig;
+    out.source_from_reference.rotation = (turn * rig.source_from_reference.rotation).normalized();
+    out.source_from_reference.translation = turn * rig.t();
+    return out;
+}
+
+Eigen::Matrix3d infinite_homography(const Rig& rig) {
+    return rig.source.K() * rig.R() * rig.reference.K().inverse();
+}
+
+}  // namespace xcalib

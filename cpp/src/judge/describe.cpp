@@ -1,0 +1,75 @@
+#include "xcalib/judge/describe.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/format.hpp"
+
+namespace xcalib {
+namespace {
+
+constexpr double kDegrees = 180 / 3.14159265358979323846;
+
+std::string vector_text(const Eigen::Vector3d& v) {
+    return format("%+.4f %+.4f %+.4f", v.x(), v.y(), v.z());
+}
+
+std::string camera_text(const char* name, const Pinhole& c) {
+    return format(
+        "%-10s %dx%d px, fx %.2f fy %.2f px, HFoV %.2f VFoV %.2f deg, cx %.2f cy %.2f px,"
+        " skew %.3f px\n",
+        name, c.width, c.height, c.fx, c.fy, c.hfov() * kDegrees, c.vfov() * kDegrees, c.cx, c.cy,
+        c.skew);
+}
+
+}  // namespace
+
+RigFacts describe(const Rig& rig) {
+    const Eigen::Matrix3d axes = rig.R().transpose();  // columns: the source camera's axes
+    RigFacts facts;
+    facts.pan_deg = std::atan2(axes(0, 2), axes(2, 2)) * kDegrees;
+    facts.tilt_deg = std::asin(std::clamp(0 - axes(1, 2), -1.0, 1.0)) * kDegrees;
+    facts.roll_deg = std::atan2(axes(1, 0), axes(1, 1)) * kDegrees;
+    facts.position = -(axes * rig.t());
+    facts.baseline = rig.t().norm();
+    const Eigen::Vector3d centre((rig.reference.width - 1) / 2.0, (rig.reference.height - 1) / 2.0,
+                                 1.0);
+    const Eigen::Vector3d ray = rig.reference.K().inverse() * centre;
+    const auto point = [&](double inverse_depth) -> Eigen::Vector2d {
+        const Eigen::Vector3d x = rig.source.K() * (rig.R() * ray + inverse_depth * rig.t());
+        // A point behind the source camera has no image.
+        if (!(x.z() > 0))
+            return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+        return x.head<2>() / x.z();
+    };
+    for (const double depth : {2.0, 5.0, 10.0, 50.0, 0.0}) {
+        RigFacts::Centre row;
+        if (depth > 0) row.depth = depth;
+        row.point = point(depth > 0 ? 1 / depth : 0.0);
+        row.parallax = (row.point - point(0.0)).norm();
+        facts.centre.push_back(row);
+    }
+    return facts;
+}
+
+std::string facts_text(const Rig& rig) {
+    const RigFacts facts = describe(rig);
+    std::string text = camera_text("reference", rig.reference) + camera_text("source", rig.source);
+    text += format("rotation   pan %+.3f (right), tilt %+.3f (up), roll %+.3f (clockwise) deg\n",
+                   facts.pan_deg, facts.tilt_deg, facts.roll_deg);
+    text += "t          " + vector_text(rig.t()) + " m (source_from_reference)\n";
+    text +=
+        "position   " + vector_text(facts.position) + " m of the source: right, down, forward\n";
+    text += format("baseline   %.4f m\n", facts.baseline);
+    text += "the reference image's centre in the source image:";
+    for (const RigFacts::Centre& row : facts.centre) {
+        const std::string distance = row.depth ? format("%g m", *row.depth) : "infinity";
+        text += format("\n  %8s: (%8.2f, %8.2f) px, parallax %6.2f px", distance.c_str(),
+                       row.point.x(), row.point.y(), row.parallax);
+    }
+    return text;
+}
+
+}  // namespace xcalib

@@ -1,0 +1,196 @@
+#include "xcalib/judge/evaluate.hpp"
+
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "base/format.hpp"
+#include "base/median.hpp"
+#include "photometry/mat.hpp"
+#include "xcalib/gray.hpp"
+#include "xcalib/judge/metrics.hpp"
+#include "xcalib/nec.hpp"
+#include "xcalib/register.hpp"
+
+namespace xcalib {
+namespace {
+
+constexpr int kErosion = 2;  // valid pixels this close to an invalid one are not judged [px]
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kPatchMedian = 6, kPatchUnder2px = 7;
+
+struct Size {
+    int width, height;
+};
+
+Size reduced(int width, int height, int factor) {
+    const auto side = [factor](int length) {
+        return std::max(1, static_cast<int>(std::nearbyint(static_cast<double>(length) / factor)));
+    };
+    return {side(width), side(height)};
+}
+
+Image resized(const Image& image, const Size& size) {
+    Image out(size.width, size.height);
+    cv::Mat result = as_mat(out);
+    cv::resize(as_mat(image), result, result.size(), 0, 0,
+               size.width < image.width ? cv::INTER_AREA : cv::INTER_LINEAR);
+    return out;
+}
+
+void set_patch_scores(const std::vector<double>& lengths, Scores& scores) {
+    if (lengths.empty()) return;
+    scores[kPatchMedian] = median(lengths);
+    std::size_t under = 0;
+    for (const double length : lengths) under += length < 2;
+    scores[kPatchUnder2px] = static_cast<double>(under) / static_cast<double>(lengths.size());
+}
+
+// Scores of one frame; the lengths of its patch shifts are appended.
+Scores scores_of(const Image& reference, const Image& image, const std::uint8_t* valid,
+                 int num_threads, std::vector<double>& lengths) {
+    std::vector<double> own;
+    for (const PatchShift& s : patch_residual(reference, image, valid, num_threads))
+        own.push_back(std::hypot(s.dx, s.dy));
+    lengths.insert(lengths.end(), own.begin(), own.end());
+    Scores scores{nec(reference, image, valid),
+                  gc(reference, image, valid),
+                  ssim(reference, image, valid, 1.0),
+                  ncc(reference, image, valid),
+                  rmse(reference, image, valid),
+                  psnr(reference, image, valid, 1.0),
+                  kNone,
+                  kNone};
+    set_patch_scores(own, scores);
+    return scores;
+}
+
+}  // namespace
+
+double Evaluation::gain(std::size_t score) const {
+    const double before = unregistered[score];
+    return before != 0 ? 100 * (registered[score] - before) / std::abs(before) : kNone;
+}
+
+std::string Evaluation::table() const {
+    struct Row {
+        const char* label;
+        double scale;
+        int digits;
+    };
+    constexpr Row kRows[] = {{"NEC", 1, 4},
+                             {"GC", 1, 4},
+                             {"SSIM", 1, 4},
+                             {"NCC", 1, 4},
+                             {"RMSE", 1, 4},
+                             {"PSNR [dB]", 1, 2},
+                             {"patch median [px]", 1, 2},
+                             {"patch < 2 px [%]", 100, 1}};
+    std::string text = format("%-18s%14s%14s%10s\n", "", "unregistered", "registered", "change");
+    for (std::size_t i = 0; i < kScoreNames.size(); ++i) {
+        const auto number = [&](const Scores& scores) {
+            const double value = kRows[i].scale * scores[i];
+            return std::isnan(value) ? "nan" : format("%.*f", kRows[i].digits, value);
+        };
+        const std::string change = std::isnan(gain(i)) ? "-" : format("%+.1f %%", gain(i));
+        text += format("%-18s%14s%14s%10s\n", kRows[i].label, number(unregistered).c_str(),
+                       number(registered).c_str(), change.c_str());
+    }
+    return text + format("%zu frames at %dx%d, %.1f %% of the pixels judged", frames.size(), width,
+                         height, 100 * valid_share);
+}
+
+struct Evaluator::State {
+    Rig rig;
+    int width, num_threads;
+    std::optional<Registrar> registrar{};
+    Size size{}, source_size{};
+    std::vector<std::pair<Scores, Scores>> frames{};
+    std::vector<double> shares{}, lengths_after{}, lengths_before{};
+
+    void open(const ImageView& reference, const ImageView& source) {
+        const Rig full =
+            fitted(rig, reference.width, reference.height, source.width, source.height);
+        size = reduced(reference.width, reference.height, (reference.width + width - 1) / width);
+        const Rig small = full.resized(size.width, size.height, source.width, source.height);
+        // A source much finer than the grid would be sampled with aliasing.
+        const int finer = std::max(1, static_cast<int>(small.source.fx / small.reference.fx));
+        source_size = reduced(source.width, source.height, finer);
+        RegistrarOptions options;
+        options.num_threads = num_threads;
+        registrar.emplace(
+            full.resized(size.width, size.height, source_size.width, source_size.height), options);
+    }
+};
+
+Evaluator::Evaluator(const Rig& rig, int width, int num_threads)
+    : state_(new State{rig, width, num_threads}) {
+    if (width < 1)
+        throw std::invalid_argument("width is " + std::to_string(width) +
+                                    ", expected at least 1 px");
+}
+
+Evaluator::~Evaluator() = default;
+
+void Evaluator::add(const ImageView& reference, const ImageView& source, const ImageView& depth) {
+    State& s = *state_;
+    if (!s.registrar) s.open(reference, source);
+    const Image target = resized(to_gray(reference), s.size), plain = to_gray(source);
+    Image registered(s.size.width, s.size.height);
+    std::vector<std::uint8_t> codes(registered.pixels.size());
+    const ImageView grid = registered.view();
+    s.registrar->register_frame(
+        resized(plain, s.source_size).view(), depth,
+        {registered.pixels.data(), grid.width, grid.height, 1, grid.type, grid.row_bytes},
+        codes.data());
+    cv::Mat mask(grid.height, grid.width, CV_8UC1, codes.data());
+    mask = mask == 0;
+    const int side = 2 * kErosion + 1;
+    cv::erode(mask, mask, cv::Mat::ones(side, side, CV_8UC1));
+    const int judged = cv::countNonZero(mask);
+    s.shares.push_back(static_cast<double>(judged) / static_cast<double>(mask.total()));
+    std::pair<Scores, Scores> scores;
+    scores.first.fill(kNone);
+    scores.second.fill(kNone);
+    if (judged > 0) {
+        scores.first = scores_of(target, registered, mask.data, s.num_threads, s.lengths_after);
+        scores.second =
+            scores_of(target, resized(plain, s.size), mask.data, s.num_threads, s.lengths_before);
+    }
+    s.frames.push_back(scores);
+}
+
+Evaluation Evaluator::result() const {
+    const State& s = *state_;
+    if (s.frames.empty()) throw std::invalid_argument("no frames to evaluate");
+    Evaluation out;
+    out.width = s.size.width;
+    out.height = s.size.height;
+    out.frames = s.frames;
+    for (const double share : s.shares)
+        out.valid_share += share / static_cast<double>(s.shares.size());
+    // Means over the frames where a score is defined; patches of all frames count alike.
+    for (std::size_t i = 0; i < kScoreNames.size(); ++i) {
+        const auto mean = [&](auto member) {
+            double sum = 0;
+            int count = 0;
+            for (const auto& frame : s.frames)
+                if (std::isfinite((frame.*member)[i])) {
+                    sum += (frame.*member)[i];
+                    ++count;
+                }
+            return count ? sum / count : kNone;
+        };
+        out.registered[i] = mean(&std::pair<Scores, Scores>::first);
+        out.unregistered[i] = mean(&std::pair<Scores, Scores>::second);
+    }
+    for (auto* scores : {&out.registered, &out.unregistered})
+        (*scores)[kPatchMedian] = (*scores)[kPatchUnder2px] = kNone;
+    set_patch_scores(s.lengths_after, out.registered);
+    set_patch_scores(s.lengths_before, out.unregistered);
+    return out;
+}
+
+}  // namespace xcalib

@@ -1,0 +1,101 @@
+#include "xcalib/parameters.hpp"
+
+#include <cmath>
+
+namespace xcalib {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// arctan of half the vertical opening at the paper's 45 deg horizontal start.
+double paper_half_vfov(int width, int height) {
+    return std::atan(static_cast<double>(height) / width * std::tan(kPi / 8));
+}
+
+Pinhole pinhole_from_paper(const PaperParameters::Camera& p, int width, int height) {
+    Pinhole camera;
+    camera.width = width;
+    camera.height = height;
+    camera.fx = width / (2 * std::tan(p.fx * kPi / 8));
+    camera.fy = height / (2 * std::tan(p.fy * paper_half_vfov(width, height)));
+    camera.cx = p.cx * width - 0.5;
+    camera.cy = p.cy * height - 0.5;
+    camera.skew = p.skew;
+    return camera;
+}
+
+PaperParameters::Camera paper_from_pinhole(const Pinhole& camera) {
+    PaperParameters::Camera p;
+    p.fx = std::atan(camera.width / (2 * camera.fx)) / (kPi / 8);
+    p.fy =
+        std::atan(camera.height / (2 * camera.fy)) / paper_half_vfov(camera.width, camera.height);
+    p.cx = (camera.cx + 0.5) / camera.width;
+    p.cy = (camera.cy + 0.5) / camera.height;
+    p.skew = camera.skew;
+    return p;
+}
+
+Pinhole pinhole_from_solver(const SolverParameters::Camera& p, int width, int height) {
+    Pinhole camera;
+    camera.width = width;
+    camera.height = height;
+    camera.fx = std::exp(p.log_f[0]) * width;
+    camera.fy = std::exp(p.log_f[1]) * height;
+    camera.cx = p.center[0] * width - 0.5;
+    camera.cy = p.center[1] * height - 0.5;
+    camera.skew = p.skew[0] * width;
+    return camera;
+}
+
+SolverParameters::Camera solver_from_pinhole(const Pinhole& camera) {
+    return {{std::log(camera.fx / camera.width), std::log(camera.fy / camera.height)},
+            {(camera.cx + 0.5) / camera.width, (camera.cy + 0.5) / camera.height},
+            {camera.skew / camera.width}};
+}
+
+}  // namespace
+
+Rig rig_from_paper(const PaperParameters& parameters, int reference_width, int reference_height,
+                   int source_width, int source_height) {
+    const Eigen::Vector4d q = parameters.quaternion.normalized();
+    Rig rig;
+    rig.reference = pinhole_from_paper(parameters.reference, reference_width, reference_height);
+    rig.source = pinhole_from_paper(parameters.source, source_width, source_height);
+    rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    constexpr double kScale = kPaperTranslationScale;
+    rig.source_from_reference.translation =
+        parameters.translation * Eigen::Vector3d(1, kScale, kScale * kScale);
+    return rig;
+}
+
+PaperParameters paper_from_rig(const Rig& rig) {
+    const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
+    PaperParameters parameters;
+    parameters.reference = paper_from_pinhole(rig.reference);
+    parameters.source = paper_from_pinhole(rig.source);
+    parameters.quaternion = {q.w(), q.x(), q.y(), q.z()};
+    parameters.translation.col(0) = rig.t();
+    return parameters;
+}
+
+SolverParameters solver_from_rig(const Rig& rig) {
+    const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
+    return {solver_from_pinhole(rig.reference),
+            solver_from_pinhole(rig.source),
+            {q.w(), q.x(), q.y(), q.z()},
+            {rig.t().x(), rig.t().y(), rig.t().z()}};
+}
+
+Rig rig_from_solver(const SolverParameters& parameters, int reference_width, int reference_height,
+                    int source_width, int source_height) {
+    const double* q = parameters.quaternion;
+    const double* t = parameters.translation;
+    Rig rig;
+    rig.reference = pinhole_from_solver(parameters.reference, reference_width, reference_height);
+    rig.source = pinhole_from_solver(parameters.source, source_width, source_height);
+    rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+    rig.source_from_reference.translation = Eigen::Vector3d(t[0], t[1], t[2]);
+    return rig;
+}
+
+}  // namespace xcalib

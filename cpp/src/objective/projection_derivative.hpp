@@ -1,0 +1,119 @@
+// How the place of a reference pixel in the source moves with the parameters of the rig.
+#pragma once
+
+#include <Eigen/Core>
+#include <type_traits>
+#include <utility>
+
+#include "xcalib/parameters.hpp"
+
+namespace xcalib {
+
+// Chain rule through Eq. (3d_mapping): the derivative of any f(x_S), given df/du and df/dv, by the
+// parameters.
+class ProjectionDerivative {
+   public:
+    explicit ProjectionDerivative(const Rig& rig)
+        : R_(rig.R().cast<float>()), t_(rig.t().cast<float>()), reference_(rig.reference),
+          fx_(static_cast<float>(rig.source.fx)), fy_(static_cast<float>(rig.source.fy)),
+          skew_(static_cast<float>(rig.source.skew)), width_(static_cast<float>(rig.source.width)),
+          height_(static_cast<float>(rig.source.height)) {}
+
+    // A reference pixel of normalized ray (x, y, 1) and its depth [m], seen by the source camera.
+    struct Point {
+        float x, y, inverse_z;  // X_S / Z_S, Y_S / Z_S, 1 / Z_S
+        float rx, ry, rz;       // R X_R
+    };
+    Point point(float ray_x, float ray_y, float depth) const {
+        const float xr = depth * ray_x, yr = depth * ray_y;
+        Point p;
+        p.rx = R_(0, 0) * xr + R_(0, 1) * yr + R_(0, 2) * depth;
+        p.ry = R_(1, 0) * xr + R_(1, 1) * yr + R_(1, 2) * depth;
+        p.rz = R_(2, 0) * xr + R_(2, 1) * yr + R_(2, 2) * depth;
+        p.inverse_z = 1.0f / (p.rz + t_.z());
+        p.x = (p.rx + t_.x()) * p.inverse_z;
+        p.y = (p.ry + t_.y()) * p.inverse_z;
+        return p;
+    }
+
+    // df/du and df/dv, and from them df/dX_S.
+    struct Slope {
+        float du, dv, qx, qy, qz;
+    };
+    Slope slope(const Point& p, float df_du, float df_dv) const {
+        Slope s;
+        s.du = df_du;
+        s.dv = df_dv;
+        s.qx = df_du * fx_ * p.inverse_z;
+        s.qy = (df_du * skew_ + df_dv * fy_) * p.inverse_z;
+        s.qz = -(s.qx * p.x + s.qy * p.y);
+        return s;
+    }
+
+    // df by one parameter.
+    template <int kParameter>
+    float partial(float ray_x, float ray_y, float depth, const Point& p, const Slope& s) const {
+        if constexpr (kParameter == kSourceLogFx) return s.du * fx_ * p.x;
+        if constexpr (kParameter == kSourceLogFy) return s.dv * fy_ * p.y;
+        if constexpr (kParameter == kSourceCx) return s.du * width_;
+        if constexpr (kParameter == kSourceCy) return s.dv * height_;
+        if constexpr (kParameter == kSourceSkew) return s.du * width_ * p.y;
+        // q . (w x R X_R) = w . (R X_R x q)
+        if constexpr (kParameter == kRotationX) return p.ry * s.qz - p.rz * s.qy;
+        if constexpr (kParameter == kRotationY) return p.rz * s.qx - p.rx * s.qz;
+        if constexpr (kParameter == kRotationZ) return p.rx * s.qy - p.ry * s.qx;
+        if constexpr (kParameter == kTranslationX) return s.qx;
+        if constexpr (kParameter == kTranslationY) return s.qy;
+        if constexpr (kParameter == kTranslationZ) return s.qz;
+        if constexpr (kParameter >= kReferenceLogFx) {
+            const float fx = static_cast<float>(reference_.fx);
+            const float fy = static_cast<float>(reference_.fy);
+            const float skew = static_cast<float>(reference_.skew);
+            const float w = static_cast<float>(reference_.width);
+            const float h = static_cast<float>(reference_.height);
+            // df/d ray
+            const float ex = depth * (R_(0, 0) * s.qx + R_(1, 0) * s.qy + R_(2, 0) * s.qz);
+            const float ey = depth * (R_(0, 1) * s.qx + R_(1, 1) * s.qy + R_(2, 1) * s.qz);
+            if constexpr (kParameter == kReferenceLogFx) return -ex * ray_x;
+            // fx ray_x = u - cx - skew ray_y: ray_y's part does not scale with fx.
+            if constexpr (kParameter == kReferenceLogFy) return (ex * skew / fx - ey) * ray_y;
+            if constexpr (kParameter == kReferenceCx) return -ex * w / fx;
+            if constexpr (kParameter == kReferenceCy) return (ex * skew / fx - ey) * h / fy;
+            if constexpr (kParameter == kReferenceSkew) return -ex * ray_y * w / fx;
+        }
+    }
+
+    // By the first kCount parameters: writes out[p * stride] for p in 0..kCount-1.
+    template <int kCount>
+    void chain(float ray_x, float ray_y, float depth, float df_du, float df_dv, float* out,
+               int stride) const {
+        const Point p = point(ray_x, ray_y, depth);
+        const Slope s = slope(p, df_du, df_dv);
+        each<kCount>([&](auto parameter) {
+            out[parameter * stride] = partial<parameter>(ray_x, ray_y, depth, p, s);
+        });
+    }
+
+    // Calls work(std::integral_constant<int, p>) for p in 0..kCount-1.
+    template <int kCount, class Work>
+    static void each(const Work& work) {
+        each(work, std::make_integer_sequence<int, kCount>());
+    }
+
+   private:
+    template <class Work, int... kParameters>
+    static void each(const Work& work, std::integer_sequence<int, kParameters...>) {
+        (work(std::integral_constant<int, kParameters>()), ...);
+    }
+
+    Eigen::Matrix3f R_;
+    Eigen::Vector3f t_;
+    Pinhole reference_;
+    float fx_, fy_, skew_, width_, height_;
+};
+
+// dT/dp at one reference pixel, (2 x kNumParameters) [px per unit parameter].
+Eigen::Matrix<double, 2, kNumParameters> warp_jacobian(const Rig& rig, double x, double y,
+                                                       double depth);
+
+}  // namespace xcalib

@@ -1,0 +1,45 @@
+// The registrar's inner loops, for whichever instruction set the machine has (Highway).
+#pragma once
+
+#include <cstdint>
+
+#include "register/cells.hpp"
+#include "xcalib/warp.hpp"
+
+namespace xcalib {
+
+// Depth as the caller has it: float32 [m], or uint16 in units of `scale` metres.
+struct DepthView {
+    ImageView view;
+    float scale = 1;
+};
+
+// Raises the cells to the nearness of the points of rows [begin, end) that fall in them.
+void splat_rows(const Reprojection& reprojection, const DepthView& depth, const CellGrid& grid,
+                int begin, int end, Nearness* cells);
+
+// Rows [begin, end) of the cells of all `count` parts as one: the nearest of each, and where both
+// neighbours, left and right or above and below, are nearer, the farther of these: a surface whose
+// pixels the source has farther apart leaves gaps.
+void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begin, int end,
+                Nearness* out);
+
+// What all rows of a frame have in common. `cells` is null where occlusion is not looked for.
+struct RowsTask {
+    const Reprojection* reprojection;
+    DepthView depth;
+    const CellGrid* grid;
+    const Nearness* cells;
+    bool hide;  // occluded pixels are 0 in the image, and NaN in the map
+    ImageView source;
+    bool nearest;
+    MutableImageView registered;
+    std::uint8_t* mask;
+};
+
+void register_rows(const RowsTask& task, int begin, int end);
+
+// The same places, as 2 floats a pixel; of the task, what is about the source is not looked at.
+void map_rows(const RowsTask& task, int begin, int end, float* out);
+
+}  // namespace xcalib

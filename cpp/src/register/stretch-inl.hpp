@@ -1,0 +1,297 @@
+// A stretch of a row: what is usual is done in loops of a few steps each, through memory. A
+// vector's steps wait for each other, and what waits fills the processor; in short loops, other
+// vectors' steps come in between. Included once for each instruction set.
+#if defined(XCALIB_STRETCH_INL_) == defined(HWY_TARGET_TOGGLE)
+#ifdef XCALIB_STRETCH_INL_
+#undef XCALIB_STRETCH_INL_
+#else
+#define XCALIB_STRETCH_INL_
+#endif
+
+#include "register/fixed-inl.hpp"
+#include "register/sample-inl.hpp"
+
+#if HWY_TARGET != HWY_SCALAR
+HWY_BEFORE_NAMESPACE();
+namespace xcalib {
+namespace HWY_NAMESPACE {
+namespace {
+
+struct UsualVector {
+    // As in Located, and in Cells.
+    HWY_ALIGN float x[kLanes], y[kLanes], a[kLanes], b[kLanes];
+    HWY_ALIGN float cell_x[kLanes], cell_y[kLanes], inverse_z[kLanes];
+};
+
+// The windows of the vectors. First the place of each vector's first point, as a float shifted by
+// kLarge; then its window's first pixel, shifted by kLargeBits, and where this lies in memory.
+struct Windows {
+    HWY_ALIGN std::int32_t x[kVectors] = {}, y[kVectors] = {}, offset[kVectors] = {};
+
+    HWY_INLINE void start(int i, Float first_x, Float first_y) {
+        const float at[] = {hn::GetLane(first_x), hn::GetLane(first_y)};
+        std::memcpy(x + i, at, sizeof(float));
+        std::memcpy(y + i, at + 1, sizeof(float));
+    }
+
+    // Places are in 1 / 2^kShift px. Windows begin `before` pixels left of the point, at the least
+    // in column 0 and row 0, at the most in `last_x` and `last_y`: within memory, whatever the
+    // points are. There are so many units to a column, and to a row.
+    template <int kShift>
+    HWY_INLINE void place(int before, int last_x, int last_y, int column, int row) {
+        const IntTag d;
+        const auto within = [](Int value, int last) HWY_ATTR {
+            return hn::Min(hn::Max(value, hn::Zero(IntTag())), set(last));
+        };
+        for (int i = 0; i < kVectors; i += kLanes) {
+            const Int shift = set(kLargeBits);
+            const Int first_x = hn::ShiftRight<kShift>(hn::Sub(hn::Load(d, x + i), shift));
+            const Int first_y = hn::ShiftRight<kShift>(hn::Sub(hn::Load(d, y + i), shift));
+            const Int left = within(hn::Sub(first_x, set(before)), last_x);
+            const Int top = within(first_y, last_y);
+            hn::Store(hn::Add(hn::ShiftLeft<kShift>(left), shift), d, x + i);
+            hn::Store(hn::Add(hn::ShiftLeft<kShift>(top), shift), d, y + i);
+            hn::Store(hn::Add(hn::Mul(top, set(row)), hn::Mul(left, set(column))), d, offset + i);
+        }
+    }
+};
+
+struct Stretch {
+    UsualVector vectors[kVectors];
+    Windows source, cells;
+};
+
+HWY_INLINE bool none(Int bits) { return hn::AllTrue(IntTag(), hn::Eq(bits, hn::Zero(IntTag()))); }
+
+// Where `count` vectors lie, from pixel `begin` of row y on. `out` is where they will be written.
+template <bool fixed, bool with_cells>
+HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& depths, int y,
+                       int begin, int count, const char* out, int vector_bytes, Stretch& stretch) {
+    const FloatTag d;
+    const Float least = hn::Set(d, least_depth(*task.reprojection, y, task.depth.view.width));
+    Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
+    for (int i = 0; i < count; ++i) {
+        UsualVector& vector = stretch.vectors[i];
+        const int x = begin + i * kLanes;
+        const Float depth = depths.load(x);
+        depths.prefetch_next_row(x);
+        __builtin_prefetch(out + (i + kVectors) * vector_bytes, 1);  // a stretch ahead
+        const Located at = locate(row, depth, along);
+        // Elsewhere it is far outside.
+        const Float left = hn::IfThenElseZero(hn::Gt(depth, least), at.x);
+        hn::Store(left, d, vector.x);
+        hn::Store(at.y, d, vector.y);
+        stretch.source.start(i, left, at.y);
+        if constexpr (!fixed) {
+            hn::Store(at.a, d, vector.a);
+            hn::Store(at.b, d, vector.b);
+        }
+        if constexpr (with_cells) {
+            Points points = at.points();
+            if constexpr (fixed) {
+                points.u = hn::Mul(points.u, set(1 / kFixedUnit));
+                points.v = hn::Mul(points.v, set(1 / kFixedUnit));
+            }
+            const Cells cells(*task.grid, points);
+            hn::Store(cells.x, d, vector.cell_x);
+            hn::Store(cells.y, d, vector.cell_y);
+            hn::Store(at.inverse_z, d, vector.inverse_z);
+            stretch.cells.start(i, cells.x, cells.y);
+        }
+        along = hn::Add(along, set(double{kLanes}));
+    }
+}
+
+// Marks what is hidden of vectors of which all points lie within the source.
+template <class T, int kChannels>
+HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, Stretch& stretch,
+                            T* out, std::uint8_t* mask) {
+    const FloatTag d;
+    const IntTag di;
+    const hn::Repartition<Nearness, IntTag> pairs;
+    const CellGrid& grid = *task.grid;
+    constexpr int kWindow = 2 * kLanes, kBefore = kWindow / 8;
+    stretch.cells.place<0>(kBefore, std::max(0, grid.width - kBefore), grid.height - 1, 1,
+                           grid.width);
+    for (int i = 0; i < count; ++i) {
+        const UsualVector& vector = stretch.vectors[i];
+        const Int x = hn::BitCast(di, hn::Load(d, vector.cell_x));
+        const Int y = hn::BitCast(di, hn::Load(d, vector.cell_y));
+        const Int index = hn::Sub(x, set(stretch.cells.x[i]));
+        const Int apart =
+            hn::Or(hn::Xor(y, set(stretch.cells.y[i])), hn::AndNot(set(kWindow - 1), index));
+        const Nearness* from = task.cells + stretch.cells.offset[i];
+        const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + grid.step()));
+        const Int both = hn::TableLookupLanes(
+            hn::BitCast(di, nearest),
+            hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
+        const Int chosen = hn::IfThenElse(hn::TestBit(index, set(1)),
+                                          hn::And(both, set(static_cast<int>(0xffff0000))),
+                                          hn::ShiftLeft<16>(both));
+        Float nearest_there = hn::BitCast(d, chosen);
+        if (!none(apart)) {
+            if (!((vectors >> i) & 1)) continue;
+            nearest_there = nearest_in(grid, task.cells, hn::BitCast(d, x), hn::BitCast(d, y));
+        }
+        const Mask behind = is_behind(grid, nearest_there, hn::Load(d, vector.inverse_z));
+        if (hn::AllFalse(d, behind)) continue;
+        store_codes(hn::IfThenElseZero(hn::RebindMask(di, behind), code_of(Validity::occluded)),
+                    mask + i * kLanes);
+        if (!task.hide) continue;
+        for (int k = i * kLanes; k < (i + 1) * kLanes; ++k)
+            if (mask[k]) std::fill_n(out + kChannels * k, kChannels, T{0});
+    }
+}
+
+// Samples the vectors of which all points lie between the same two rows of the source, and within a
+// window of them. Returns which do not; of these nothing that is written counts, so that nothing
+// waits for a branch. The source must be wider than the window.
+template <class T, Reach reach>
+HWY_INLINE Vectors sample_windows(const Source& source, int count, Stretch& stretch, T* out,
+                                  std::uint8_t* mask) {
+    const FloatTag d;
+    const IntTag di;
+    constexpr int kWindow = window<T, reach>();
+    Windows& windows = stretch.source;
+    windows.place<0>(kBefore<T, reach>, source.width - 1 - kWindow, source.height - 2, sizeof(T),
+                     static_cast<int>(source.row_bytes));
+    Vectors others = 0;
+    for (int i = 0; i < count; ++i) {
+        const UsualVector& vector = stretch.vectors[i];
+        const Int x = hn::BitCast(di, hn::Load(d, vector.x));
+        const Int y = hn::BitCast(di, hn::Load(d, vector.y));
+        const Int index = hn::Sub(x, set(windows.x[i]));
+        const Int apart =
+            hn::Or(hn::Xor(y, set(windows.y[i])), hn::AndNot(set(kWindow - 1), index));
+        others |= Vectors{!none(apart)} << i;
+        store(interpolate_in_window<T, reach>(source, windows.offset[i], index,
+                                              hn::Load(d, vector.a), hn::Load(d, vector.b)),
+              out + i * kLanes);
+        hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
+    }
+    return others;
+}
+
+// The same of some of the vectors, wherever within the source their points lie: at depth edges,
+// where the points come into the next row, of a source too fine for windows, and of colours.
+template <class T, int kChannels, bool fixed>
+HWY_INLINE Vectors gather(const Source& source, Vectors vectors, const Stretch& stretch, T* out,
+                          std::uint8_t* mask) {
+    const FloatTag d;
+    const IntTag di;
+    const hn::RebindToUnsigned<IntTag> du;
+    const auto number = [&](const float* shifted) HWY_ATTR {
+        return hn::Sub(hn::BitCast(di, hn::Load(d, shifted)), set(kLargeBits));
+    };
+    const auto within = [&](Int value, int size) HWY_ATTR {  // those below 0 are large
+        const auto last = hn::Set(du, static_cast<std::uint32_t>(size - 2));
+        return hn::BitCast(di, hn::Min(hn::BitCast(du, value), last));
+    };
+    const auto part = [&](Int value) HWY_ATTR {
+        const Float units = hn::ConvertTo(d, hn::And(value, set((1 << kFixedBits) - 1)));
+        return hn::Mul(units, set(1 / (kFixedUnit - 1)));
+    };
+    Vectors others = 0;
+    for (; vectors; vectors &= vectors - 1) {
+        const int i = first_of(vectors);
+        const UsualVector& vector = stretch.vectors[i];
+        Int x = number(vector.x), y = number(vector.y);
+        Float a, b;
+        if constexpr (fixed) {
+            a = part(x);
+            b = part(y);
+            x = hn::ShiftRight<kFixedBits>(x);
+            y = hn::ShiftRight<kFixedBits>(y);
+        } else {
+            a = hn::Load(d, vector.a);
+            b = hn::Load(d, vector.b);
+        }
+        const Int left = within(x, source.width), top = within(y, source.height);
+        others |= Vectors{!none(hn::Or(hn::Xor(x, left), hn::Xor(y, top)))} << i;
+        Float values[kChannels];
+        interpolate_anywhere<T>(source, left, top, a, b, values);
+        store_pixels(values, out + i * kLanes * kChannels);
+        hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
+    }
+    return others;
+}
+
+#if XCALIB_FIXED
+// The same of bytes, located in fixed numbers.
+HWY_INLINE Vectors sample_fixed(const Source& source, int count, Stretch& stretch,
+                                std::uint8_t* out, std::uint8_t* mask) {
+    const FloatTag d;
+    const IntTag di;
+    Windows& windows = stretch.source;
+    windows.place<kFixedBits>(kFixedWindow / 8, source.width - kFixedWindow, source.height - 2, 1,
+                              static_cast<int>(source.row_bytes));
+    Vectors others = 0;
+    for (int i = 0; i < count; ++i) {
+        const UsualVector& vector = stretch.vectors[i];
+        const Int x = hn::Sub(hn::BitCast(di, hn::Load(d, vector.x)), set(windows.x[i]));
+        const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
+        const bool inside = interpolate_fixed(source, windows.offset[i], x, y, out + i * kLanes);
+        others |= Vectors{!inside} << i;
+        hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
+    }
+    return others;
+}
+#endif
+
+// A row for each way to locate.
+struct RowPair {
+    Row exact, fixed;
+
+    HWY_INLINE RowPair(const Reprojection& r, int y)
+        : exact(r, y, kHalfBack), fixed(r, y, kFixedShift, kFixedUnit, kFixedUnit) {}
+};
+
+// Locates vectors of a row, `count` from pixel `begin` on, and samples them. Returns those of which
+// some points lie outside the source, or nowhere.
+template <class T, int kChannels, bool with_cells>
+HWY_INLINE Vectors sample_stretch(const RowsTask& task, const Source& source, Reach reach,
+                                  const RowPair& row, const DepthRow& depths, int y, int begin,
+                                  int count, T* out, std::uint8_t* mask, Stretch& stretch) {
+    const auto* to = reinterpret_cast<const char*>(out);
+    constexpr int kBytes = int{sizeof(T)} * kLanes * kChannels;
+    Vectors others = all_of(count);
+#if XCALIB_FIXED
+    if constexpr (sizeof(T) == 1 && kChannels == 1) {
+        if (fits_fixed(source, reach)) {
+            locate<true, with_cells>(task, row.fixed, depths, y, begin, count, to, kBytes, stretch);
+            others = sample_fixed(source, count, stretch, out, mask);
+            return gather<T, 1, true>(source, others, stretch, out, mask);
+        }
+    }
+#endif
+    locate<false, with_cells>(task, row.exact, depths, y, begin, count, to, kBytes, stretch);
+    if constexpr (kChannels == 1) {
+        if (reach == Reach::one)
+            others = sample_windows<T, Reach::one>(source, count, stretch, out, mask);
+        else if (reach == Reach::two)
+            others = sample_windows<T, Reach::two>(source, count, stretch, out, mask);
+    }
+    return gather<T, kChannels, false>(source, others, stretch, out, mask);
+}
+
+// The same, and marks what is hidden. Returns those that are to be done one by one.
+template <class T, int kChannels>
+HWY_INLINE Vectors register_stretch(const RowsTask& task, const Source& source, Reach reach,
+                                    const RowPair& row, const DepthRow& depths, int y, int begin,
+                                    int count, T* out, std::uint8_t* mask, Stretch& stretch) {
+    if (!task.cells)
+        return sample_stretch<T, kChannels, false>(task, source, reach, row, depths, y, begin,
+                                                   count, out, mask, stretch);
+    const Vectors others = sample_stretch<T, kChannels, true>(task, source, reach, row, depths, y,
+                                                              begin, count, out, mask, stretch);
+    mark_hidden<T, kChannels>(task, all_of(count) & ~others, count, stretch, out, mask);
+    return others;
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace xcalib
+HWY_AFTER_NAMESPACE();
+#endif
+
+#endif

@@ -1,0 +1,29 @@
+#include <stdexcept>
+
+#include "register/c_api.hpp"
+#include "xcalib/rig_file.hpp"
+#include "xcalib_rig_file.h"
+
+namespace {
+
+xcalib_camera camera_of(const xcalib::Pinhole& camera) {
+    return {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.skew};
+}
+
+}  // namespace
+
+xcalib_status xcalib_load_rig(const char* path, xcalib_rig* rig) try {
+    if (!path || !rig) throw std::invalid_argument(path ? "rig is NULL" : "path is NULL");
+    const xcalib::Rig read = xcalib::load_rig(path);
+    const Eigen::Quaterniond& q = read.source_from_reference.rotation;
+    const xcalib::RelativeDepth relative = read.relative_depth.value_or(xcalib::RelativeDepth{0});
+    *rig = {camera_of(read.reference),
+            camera_of(read.source),
+            {q.w(), q.x(), q.y(), q.z()},
+            {read.t().x(), read.t().y(), read.t().z()},
+            relative.scale,
+            relative.shift};
+    return XCALIB_OK;
+} catch (...) {
+    return xcalib::status_of_exception();
+}

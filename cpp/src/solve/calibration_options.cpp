@@ -1,0 +1,60 @@
+#include "xcalib/calibration_options.hpp"
+
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+namespace xcalib {
+namespace {
+
+void require(bool ok, const char* field, double value, const char* expected) {
+    if (ok) return;
+    std::ostringstream message;
+    message << "options: " << field << " = " << value << ", expected " << expected;
+    throw std::invalid_argument(message.str());
+}
+
+}  // namespace
+
+void CalibrationOptions::validate() const {
+    require(max_frames >= 1, "max_frames", max_frames, "at least 1");
+    require(num_threads >= 0, "num_threads", num_threads, "0 (every core) or more");
+    require(working_width >= 64, "working_width", working_width, "at least 64 px");
+    require(max_iterations >= 1, "max_iterations", max_iterations, "at least 1");
+    require(std::isfinite(prior_weight) && prior_weight >= 0, "prior_weight", prior_weight,
+            "a finite number >= 0");
+    require(std::isfinite(flow_weight) && flow_weight > 0, "flow_weight", flow_weight,
+            "a finite number > 0");
+    require(flow_rounds >= 1, "flow_rounds", flow_rounds, "at least 1");
+    if (reference_hfov_deg)
+        require(*reference_hfov_deg > 0 && *reference_hfov_deg < 180, "reference_hfov_deg",
+                *reference_hfov_deg, "an angle in (0, 180) deg");
+    if (reference_camera) reference_camera->validate("options: reference_camera");
+    if (source_camera) source_camera->validate("options: source_camera");
+    require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
+            search.max_fov_ratio, "a ratio in (1, 10]");
+    require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",
+            search.max_roll_deg, "an angle in [0, 180] deg");
+    require(search.min_overlap > 0 && search.min_overlap < 1, "search.min_overlap",
+            search.min_overlap, "a share in (0, 1)");
+    require(search.map_width >= 32, "search.map_width", search.map_width, "at least 32 px");
+    require(search.candidates >= 1, "search.candidates", search.candidates, "at least 1");
+    if (relative_depth) relative_depth->validate("options: relative_depth");
+    if (solver != Solver::adam) return;
+    if (search.mode == SearchMode::full || search.mode == SearchMode::local)
+        throw std::invalid_argument(
+            "options: solver = adam searches nothing, expected search.mode = automatic or off");
+    require(adam.epochs >= 1, "adam.epochs", adam.epochs, "at least 1");
+    require(adam.batch >= 1, "adam.batch", adam.batch, "at least 1");
+    require(adam.learning_rate > 0 && std::isfinite(adam.learning_rate), "adam.learning_rate",
+            adam.learning_rate, "a finite number > 0");
+    require(adam.fine_learning_rate > 0 && std::isfinite(adam.fine_learning_rate),
+            "adam.fine_learning_rate", adam.fine_learning_rate, "a finite number > 0");
+    require(adam.decay > 0 && adam.decay <= 1, "adam.decay", adam.decay, "a factor in (0, 1]");
+    require(adam.fine_from >= 0 && adam.fine_from <= 1, "adam.fine_from", adam.fine_from,
+            "a share in [0, 1]");
+    require(adam.translation_scales >= 1 && adam.translation_scales <= 3, "adam.translation_scales",
+            adam.translation_scales, "1 to 3");
+}
+
+}  // namespace xcalib

@@ -1,0 +1,27 @@
+// Rigs that should be one.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "xcalib/camera.hpp"
+
+namespace xcalib::testing {
+
+inline void expect_same(const Pinhole& a, const Pinhole& b, double tolerance) {
+    EXPECT_EQ(a.width, b.width);
+    EXPECT_EQ(a.height, b.height);
+    EXPECT_NEAR(a.fx, b.fx, tolerance);
+    EXPECT_NEAR(a.fy, b.fy, tolerance);
+    EXPECT_NEAR(a.cx, b.cx, tolerance);
+    EXPECT_NEAR(a.cy, b.cy, tolerance);
+    EXPECT_NEAR(a.skew, b.skew, tolerance);
+}
+
+inline void expect_same(const Rig& a, const Rig& b, double tolerance) {
+    expect_same(a.reference, b.reference, tolerance);
+    expect_same(a.source, b.source, tolerance);
+    EXPECT_LT((a.R() - b.R()).norm(), tolerance);
+    EXPECT_LT((a.t() - b.t()).norm(), tolerance);
+}
+
+}  // namespace xcalib::testing
