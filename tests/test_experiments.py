@@ -34,6 +34,7 @@ def run(folder: Path, *arguments: str) -> str:
     ("arguments", "table"),
     [
         (["3", "--part", "rendered"], "3_rendered"),
+        (["4"], "4_scales"),
         (["6"], "6_depth"),
     ],
 )
