@@ -19,9 +19,9 @@ export CCACHE_NOHASHDIR := 1
 export CXX
 
 BUILD_PACKAGES := ccache cmake g++ libceres-dev libeigen3-dev libhwy-dev libopencv-dev libyaml-cpp-dev make \
-    ninja-build python3-dev python3-venv
+    ninja-build nlohmann-json3-dev python3-dev python3-venv
 # What xcalib-cli needs besides.
-CLI_PACKAGES := libavcodec-dev libavformat-dev libavutil-dev libcli11-dev libswscale-dev nlohmann-json3-dev pkg-config
+CLI_PACKAGES := libavcodec-dev libavformat-dev libavutil-dev libcli11-dev libswscale-dev pkg-config
 TEST_PACKAGES := clang-format libgtest-dev pkg-config
 BENCH_PACKAGES := libbenchmark-dev
 # The cross compiler's own libraries, and an emulator: no foreign architecture is added to dpkg.

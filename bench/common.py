@@ -17,7 +17,7 @@ import numpy as np
 from figures import skipped
 
 import xcalib
-from xcalib import synthetic
+from xcalib import metrics
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -65,4 +65,4 @@ def gray(image: np.ndarray) -> np.ndarray:
 
 def median_error(found: xcalib.Rig, truth: xcalib.Rig, depths) -> float:
     """Median end-point error over all pixels of all depth maps [source px]."""
-    return float(np.nanmedian([synthetic.end_point_error(found, truth, d) for d in depths]))
+    return float(np.nanmedian([metrics.end_point_error(found, truth, d) for d in depths]))

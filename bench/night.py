@@ -102,10 +102,11 @@ class NightRig:
         depth: Depth,
         names: Sequence[str] | None = None,
         options: xcalib.CalibrationOptions | None = None,
+        how: Callable[..., xcalib.CalibrationResult] = xcalib.calibrate,
     ) -> xcalib.CalibrationResult:
         """On the frames that are not held out, unless others are named."""
         names = self.fitted if names is None else names
-        return xcalib.calibrate(
+        return how(
             [self.visible(n) for n in names],
             [self.thermal(n) for n in names],
             [depth(n) for n in names],

@@ -36,8 +36,10 @@ class Rendered:
     sources: np.ndarray  # (N, h, w) uint8
     depths: np.ndarray  # (N, H, W) float32 [m]
 
-    def calibrate(self, options=None, frames=slice(None), depths=None, initial=None):
-        return xcalib.calibrate(
+    def calibrate(
+        self, options=None, frames=slice(None), depths=None, initial=None, how=xcalib.calibrate
+    ) -> xcalib.CalibrationResult:
+        return how(
             list(self.references[frames]),
             list(self.sources[frames]),
             list((self.depths if depths is None else depths)[frames]),

@@ -14,7 +14,16 @@ import pytest
 from numpy.typing import NDArray
 
 import xcalib
-from xcalib import CalibrationOptions, Pinhole, Registrar, Rig, SearchOptions, _core, synthetic
+from xcalib import (
+    CalibrationOptions,
+    Pinhole,
+    Registrar,
+    Rig,
+    SearchOptions,
+    _core,
+    metrics,
+    synthetic,
+)
 
 Array = NDArray[Any]
 WIDTH, HEIGHT, FRAMES = 320, 240, 6
@@ -267,11 +276,11 @@ def test_validation_names_field_value_and_range(changed: dict[str, Any], message
         CalibrationOptions(**changed).validate()
 
 
-def test_choose_frames() -> None:
-    assert _core.choose_frames(3, 32, 0) == [0, 1, 2]
-    chosen = _core.choose_frames(100, 10, seed=5)
+def test_draw_frames() -> None:
+    assert _core.draw_frames(3, 32, 0) == [0, 1, 2]
+    chosen = _core.draw_frames(100, 10, seed=5)
     assert [index // 10 for index in chosen] == list(range(10))
-    assert chosen == _core.choose_frames(100, 10, seed=5) != _core.choose_frames(100, 10, seed=6)
+    assert chosen == _core.draw_frames(100, 10, seed=5) != _core.draw_frames(100, 10, seed=6)
 
 
 # --- The registrar --------------------------------------------------------------------------------
@@ -557,7 +566,7 @@ def test_unusable_frames_are_named() -> None:
 
 def test_a_frame_that_is_not_chosen_is_checked_too() -> None:
     references, sources, depths = footage(8)
-    chosen = _core.choose_frames(8, 2, 0)
+    chosen = _core.draw_frames(8, 2, 0)
     unused = next(i for i in range(8) if i not in chosen)
     sources[unused] = sources[unused][:-1]
     assert f"source frame {unused}" in refused(references, sources, depths, max_frames=2)
@@ -617,7 +626,7 @@ def result(
 def test_a_rendered_rig_is_found(
     result: xcalib.CalibrationResult, truth: Rig, frames: list[synthetic.Frame]
 ) -> None:
-    errors = [synthetic.end_point_error(result.rig, truth, frame.depth) for frame in frames]
+    errors = [metrics.end_point_error(result.rig, truth, frame.depth) for frame in frames]
     assert np.nanmedian(errors) < 0.5
     assert result.converged and result.report.converged
 
@@ -659,7 +668,7 @@ def test_a_seed_gives_the_same_rig_again(
 ) -> None:
     options = CalibrationOptions(max_frames=2, seed=3, working_width=160)
     one, other = (xcalib.calibrate(*lists_of(frames), options=options) for _ in range(2))
-    assert one.report.frames == other.report.frames == _core.choose_frames(FRAMES, 2, 3)
+    assert one.report.frames == other.report.frames == _core.draw_frames(FRAMES, 2, 3)
     np.testing.assert_array_equal(one.rig.R, other.rig.R)
     np.testing.assert_array_equal(one.rig.t, other.rig.t)
     np.testing.assert_array_equal(one.rig.source.K, other.rig.source.K)
@@ -698,7 +707,7 @@ def test_a_good_initial_rig_is_refined_without_a_search(
     options = CalibrationOptions(search=SearchOptions(mode="off"))
     result = xcalib.calibrate(*lists_of(frames), initial=start, options=options)
     errors, before = (
-        [synthetic.end_point_error(rig, truth, frame.depth) for frame in frames]
+        [metrics.end_point_error(rig, truth, frame.depth) for frame in frames]
         for rig in (result.rig, start)
     )
     assert np.nanmedian(before) > 1
@@ -713,7 +722,7 @@ def test_a_wrong_initial_translation_is_not_kept(
     start = Rig(truth.reference, truth.source, truth.R, truth.t + off)
     result = xcalib.calibrate(*lists_of(frames[:2]), initial=start)
     errors, before = (
-        [synthetic.end_point_error(rig, truth, frame.depth) for frame in frames[:2]]
+        [metrics.end_point_error(rig, truth, frame.depth) for frame in frames[:2]]
         for rig in (result.rig, start)
     )
     assert np.nanmedian(before) > 10

@@ -16,7 +16,7 @@ import pytest
 from click.testing import Result
 
 from conftest import FRAMES, run
-from xcalib import CalibrationOptions, Pinhole, Rig, pipeline, synthetic
+from xcalib import CalibrationOptions, Pinhole, Rig, metrics, pipeline
 from xcalib.depth import read_depth
 from xcalib.evaluate import evaluate
 from xcalib.frames import Image, list_files, read_image, write_image
@@ -71,7 +71,7 @@ def test_calibrate_finds_the_rig(calibrated: tuple[Path, Result], rendered: Path
     assert str(folder / "rig.yaml") in result.stdout
     rig, truth = Rig.load(folder / "rig.yaml"), Rig.load(rendered / "rig.yaml")
     depth = read_depth(files(rendered / "depth")[0])
-    assert np.nanmedian(synthetic.end_point_error(rig, truth, depth)) < 0.5
+    assert np.nanmedian(metrics.end_point_error(rig, truth, depth)) < 0.5
 
 
 def test_report_prints_what_calibrate_wrote(calibrated: tuple[Path, Result]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from conftest import FRAMES, run
-from xcalib import Pinhole, Rig, synthetic
+from xcalib import Pinhole, Rig, metrics
 from xcalib.depth import FolderDepth, PlaneDepth, read_depth
 from xcalib.footage import (
     Matching,
@@ -749,7 +749,7 @@ def test_calibrate_two_videos(filmed: Path, rendered: Path, tmp_path: Path) -> N
     assert result.exit_code == 0, result.output
     assert f"{FRAMES} pairs by time" in result.stderr
     depth = read_depth(list_files(rendered / "depth")[0])
-    error = synthetic.end_point_error(Rig.load(out), Rig.load(rendered / "rig.yaml"), depth)
+    error = metrics.end_point_error(Rig.load(out), Rig.load(rendered / "rig.yaml"), depth)
     assert np.nanmedian(error) < 0.5
 
 

@@ -1,4 +1,4 @@
-"""The metrics against scikit-image and plain numpy, and the patch residual against known shifts."""
+"""The metrics against scikit-image and plain numpy, shifts that are known, and geometry by hand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
-from xcalib import metrics
+from xcalib import Pinhole, Rig, metrics
 
 Array = NDArray[Any]
 Metric = Callable[..., float]
@@ -307,3 +307,23 @@ def test_flat_images_have_no_patches_that_tell() -> None:
     flat = np.full((200, 200), 0.5, np.float32)
     assert len(metrics.patch_residual(flat, flat).shifts) == 0
     assert len(metrics.patch_residual(texture(28, 200, 200), flat).shifts) == 0
+
+
+def test_end_point_error_of_a_shift_is_focal_length_times_shift_over_depth() -> None:
+    camera = Pinhole(40, 30, 50.0, 50.0, 19.5, 14.5, 0.0)
+    truth = Rig(camera, camera, np.eye(3), np.zeros(3))
+    moved = Rig(camera, camera, np.eye(3), np.array([0.1, 0.0, 0.0]))
+    depth = np.full((30, 40), 2.0, np.float32)
+    depth[0, :5] = (0, -1, np.nan, np.inf, 4)
+    error = metrics.end_point_error(moved, truth, depth)
+    assert error.dtype == np.float32 and np.isnan(error[0, :4]).all()
+    assert error[0, 4] == pytest.approx(50 * 0.1 / 4)
+    np.testing.assert_allclose(error[1:], 2.5, rtol=1e-6)
+    # Whether a pixel counts is up to the true rig alone, unless the point goes behind the other
+    # camera.
+    reverse = metrics.end_point_error(truth, moved, depth)
+    assert np.isnan(reverse[5, 38:]).all() and np.isfinite(reverse[5, :37]).all()
+    behind = Rig(camera, camera, np.eye(3), np.array([0.0, 0.0, -3.0]))
+    assert np.isnan(metrics.end_point_error(behind, truth, depth[1:2].repeat(30, 0))).all()
+    with pytest.raises(ValueError, match=r"depth.shape is \(3, 4\), expected .*\(30, 40\)"):
+        metrics.end_point_error(truth, truth, np.ones((3, 4), np.float32))

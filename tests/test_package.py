@@ -9,6 +9,8 @@ import tomllib
 from importlib.metadata import files, metadata
 from pathlib import Path, PurePosixPath
 
+import pytest
+
 import xcalib
 
 DISTRIBUTION = "xcalib-rgbt"
@@ -41,6 +43,25 @@ def test_the_wheel_holds_the_package_and_nothing_else() -> None:
     assert tops == {"xcalib", info, ".."}  # .. leads to the environment's bin/xcalib
     licences = {path.name for path in installed if "licenses" in path.parts}
     assert licences == {"LICENSE", "README.md"}
+
+
+def test_what_is_not_used_is_not_imported() -> None:
+    code = """
+import sys
+import xcalib, xcalib.cli
+xcalib.cli.cli(["--version"], standalone_mode=False)
+heavy = {"numpy", "cv2", "av", "tqdm", "yaml", "xcalib._core"} & sys.modules.keys()
+assert not heavy, heavy
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_every_public_name_is_there() -> None:
+    assert set(xcalib.__all__) <= set(dir(xcalib))
+    for name in xcalib.__all__:
+        assert getattr(xcalib, name) is not None
+    with pytest.raises(AttributeError, match="module 'xcalib' has no attribute 'Rigg'"):
+        xcalib.Rigg  # type: ignore[attr-defined]  # noqa: B018
 
 
 def test_two_opencvs_live_in_one_process() -> None:

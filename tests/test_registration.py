@@ -24,8 +24,11 @@ from click.testing import Result
 from conftest import FRAMES, run
 from drive import COPIES, arguments, contents, files_below, same_frames
 from xcalib import Rig, registration
-from xcalib.depth import FolderDepth, NetworkDepth
+from xcalib.depth import DepthProvider, FolderDepth, PlaneDepth
+from xcalib.depth.completion import CompletedDepth
+from xcalib.depth.conditioning import SteadyDepth
 from xcalib.footage import Stream, open_stream
+from xcalib.footage.opening import PickedDepth
 from xcalib.footage.writer import FolderSink, VideoSink
 from xcalib.frames import Image, list_files, read_image, write_image
 from xcalib.pipeline import Frames
@@ -142,7 +145,7 @@ def test_memory_is_flat(rendered: Path, tmp_path: Path, out: str) -> None:
         for kind in ("visible", "thermal")
     )
     depth = FolderDepth(rendered / "depth", list_files(rendered / "visible"))
-    frames = Frames(references, sources, lambda index, image: depth(0, image))
+    frames = Frames(references, sources, PickedDepth(depth, [0] * count))
     run_registration(frames, Rig.load(rendered / "rig.yaml"), tmp_path / out, quiet=True)
     frame = (references.image.nbytes + 4 * 320 * 240 + 2 * 320 * 240) / 1e6
     grown = max(references.resident[100:]) - max(references.resident[:100])
@@ -477,4 +480,16 @@ def test_what_cannot_be_written_is_an_error(drive: Path, tmp_path: Path, out: st
 
 def test_sinks_tell_what_several_threads_may_do() -> None:
     assert FolderSink.parallel and not VideoSink.parallel
-    assert FolderDepth.parallel and not getattr(NetworkDepth, "parallel", False)
+
+
+def test_depth_made_of_other_depth_passes_on_what_that_is(rendered: Path) -> None:
+    folder = FolderDepth(rendered / "depth", list_files(rendered / "visible"))
+    assert folder.is_parallel and not folder.is_steady and folder.relative is None
+    assert PickedDepth(CompletedDepth(PlaneDepth()), [0]).is_parallel
+    assert not PickedDepth(CompletedDepth(DepthProvider()), [0]).is_parallel
+    for steady in (SteadyDepth(folder), PickedDepth(CompletedDepth(SteadyDepth(folder)), [0])):
+        assert steady.is_steady and not steady.is_parallel
+    picked = PickedDepth(CompletedDepth(folder), [3, 1])
+    assert picked.is_parallel and not picked.is_steady
+    assert picked.files_of(0) == [folder.paths[3]]
+    assert PlaneDepth().files_of(0) == []

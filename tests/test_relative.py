@@ -12,6 +12,9 @@ import xcalib
 from conftest import run
 from xcalib import CalibrationOptions, Registrar, RelativeDepth, Rig
 from xcalib.depth import NetworkDepth, NetworkOptions, read_depth
+from xcalib.depth.completion import CompletedDepth
+from xcalib.depth.conditioning import SteadyDepth
+from xcalib.footage.opening import PickedDepth
 from xcalib.frames import list_files, read_image, write_image
 
 NEAREST = 0.5  # [1/m] that 255 stands for
@@ -82,7 +85,7 @@ def test_calibrate_and_register_with_relative_depth(blue: Path) -> None:
     # What was registered is what the rig's own scale and shift give.
     reference = read_image(list_files(blue / "visible")[0])
     network = NetworkDepth(blue / "blue.onnx", NetworkOptions())
-    network.relative = rig.relative_depth
+    network.relative_depth = rig.relative_depth
     registrar = Registrar(rig)
     source = read_image(list_files(blue / "thermal")[0])
     expected, _ = registrar.register(source, network(0, reference))
@@ -138,13 +141,14 @@ def test_arrays_of_relative_depth(rendered: Path) -> None:
 def test_pooled_normalization_and_bad_values(blue: Path) -> None:
     network = NetworkDepth(blue / "blue.onnx")
     images = [read_image(path) for path in list_files(blue / "visible")]
-    assert network.is_relative
+    assert network.relative is network and not network.is_parallel
     pooled = network.pooled(images)
     raw = np.concatenate([network.raw(i, image).ravel() for i, image in enumerate(images)])
     far, near = np.percentile(raw, (2, 98))
     assert 1 / (pooled.scale * far + pooled.shift) == pytest.approx(80, rel=1e-4)
     assert 1 / (pooled.scale * near + pooled.shift) == pytest.approx(2, rel=1e-4)
-    assert not NetworkDepth(blue / "blue.onnx", NetworkOptions(scale=1.0)).is_relative
+    assert NetworkDepth(blue / "blue.onnx", NetworkOptions(scale=1.0)).relative is None
+    assert PickedDepth(CompletedDepth(SteadyDepth(network)), [0]).relative is network
     with pytest.raises(ValueError, match="scale = 0, expected a finite number > 0"):
         RelativeDepth(0.0, 1.0)
     with pytest.raises(ValueError, match="shift = nan"):

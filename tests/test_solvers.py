@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,16 @@ from numpy.typing import NDArray
 
 import xcalib
 from conftest import run
-from xcalib import AdamOptions, CalibrationOptions, Pinhole, Rig, SearchOptions, _core, synthetic
+from xcalib import (
+    AdamOptions,
+    CalibrationOptions,
+    Pinhole,
+    Rig,
+    SearchOptions,
+    _core,
+    metrics,
+    synthetic,
+)
 
 Floats = NDArray[np.float32]
 
@@ -30,18 +40,29 @@ def frames(truth: Rig) -> list[synthetic.Frame]:
     return list(synthetic.render(truth, num_frames=4, seed=1))
 
 
-def calibrate(frames: list[synthetic.Frame], provider: Any = None, **options: Any) -> Any:
-    return xcalib.calibrate(
+def calibrate(
+    frames: list[synthetic.Frame],
+    provider: Any = None,
+    initial: Rig | None = None,
+    without: str | None = None,
+    **options: Any,
+) -> Any:
+    """`xcalib.calibrate`, if need be with a part of the method off."""
+    call = (
+        partial(_core._calibrate, _core._Parts(**{without: False})) if without else xcalib.calibrate
+    )
+    return call(
         [frame.reference for frame in frames],
         [frame.source for frame in frames],
         [frame.depth for frame in frames],
+        initial,
         options=CalibrationOptions(**options),
         flow=provider,
     )
 
 
 def error(rig: Rig, truth: Rig, frames: list[synthetic.Frame]) -> float:
-    maps = [synthetic.end_point_error(rig, truth, frame.depth) for frame in frames]
+    maps = [metrics.end_point_error(rig, truth, frame.depth) for frame in frames]
     return float(np.nanmedian(np.stack(maps)))
 
 
@@ -225,23 +246,14 @@ def test_bad_options(scene: Path, more: tuple[str, ...], named: str) -> None:
 def test_a_schedule_without_a_part(
     frames: list[synthetic.Frame], part: str, steps: set[tuple[int, int]]
 ) -> None:
-    parts = _core._Parts(**{part: False})
-    result = calibrate(frames[:2], search=SearchOptions(candidates=1), _parts=parts)
+    result = calibrate(frames[:2], without=part, search=SearchOptions(candidates=1))
     assert {(level.factor, level.stage) for level in result.report.levels} == steps
 
 
 def test_without_images_and_flow_a_rig_stays_as_it_was_given(
     truth: Rig, frames: list[synthetic.Frame]
 ) -> None:
-    result = xcalib.calibrate(
-        [frame.reference for frame in frames[:2]],
-        [frame.source for frame in frames[:2]],
-        [frame.depth for frame in frames[:2]],
-        initial=truth,
-        options=CalibrationOptions(
-            search=SearchOptions(mode="off"),
-            flow="off",
-            _parts=_core._Parts(images=False),
-        ),
+    result = calibrate(
+        frames[:2], initial=truth, without="images", search=SearchOptions(mode="off"), flow="off"
     )
     assert error(result.rig, truth, frames) < 1e-6

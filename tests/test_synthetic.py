@@ -178,6 +178,18 @@ def test_occluded_means_something_nearer_is_in_the_way() -> None:
     assert hidden[inside][free].mean() < 0.002
 
 
+def test_occlusions_do_not_depend_on_the_size_of_the_images() -> None:
+    """Every third pixel centre of images of three times the size is one of the small images."""
+    small = synthetic.demo_rig().resized(430, 320, 320, 256)
+    large = small.resized(3 * 430, 3 * 320, 3 * 320, 3 * 256)
+    for seed in (1, 2, 3):
+        few, many = (synthetic.Street(rig, 1, seed=seed).occluded(0) for rig in (small, large))
+        assert few.mean() > 0.002
+        # The source image ends at its outermost pixel centres, which lie further out in the large.
+        assert (few & ~many[1::3, 1::3]).sum() <= 2
+        assert (few != many[1::3, 1::3]).mean() < 1e-3
+
+
 def test_one_camera_in_two_places_at_once_hides_nothing() -> None:
     camera = small_rig().reference
     street = synthetic.Street(Rig(camera, camera, np.eye(3), np.zeros(3)), 1)
@@ -243,24 +255,6 @@ def test_the_demo_rig_is_plausible() -> None:
     assert np.linalg.norm(rig.t) == pytest.approx(0.15)
 
 
-def test_end_point_error_of_a_shift_is_focal_length_times_shift_over_depth() -> None:
-    camera = Pinhole(40, 30, 50.0, 50.0, 19.5, 14.5, 0.0)
-    truth = Rig(camera, camera, np.eye(3), np.zeros(3))
-    moved = Rig(camera, camera, np.eye(3), np.array([0.1, 0.0, 0.0]))
-    depth = np.full((30, 40), 2.0, np.float32)
-    depth[0, :5] = (0, -1, np.nan, np.inf, 4)
-    error = synthetic.end_point_error(moved, truth, depth)
-    assert error.dtype == np.float32 and np.isnan(error[0, :4]).all()
-    assert error[0, 4] == pytest.approx(50 * 0.1 / 4)
-    np.testing.assert_allclose(error[1:], 2.5, rtol=1e-6)
-    # Whether a pixel counts is up to the true rig alone, unless the point goes behind the other
-    # camera.
-    reverse = synthetic.end_point_error(truth, moved, depth)
-    assert np.isnan(reverse[5, 38:]).all() and np.isfinite(reverse[5, :37]).all()
-    behind = Rig(camera, camera, np.eye(3), np.array([0.0, 0.0, -3.0]))
-    assert np.isnan(synthetic.end_point_error(behind, truth, depth[1:2].repeat(30, 0))).all()
-
-
 def test_written_frames_read_back(tmp_path: Path) -> None:
     rig = small_rig()
     frame = next(synthetic.render(rig, 1, source_dtype=np.uint16))
@@ -307,8 +301,6 @@ def test_other_bad_arguments_are_named() -> None:
         synthetic.random_rig(0, fov_ratio=(4.0, 5.0))
     with pytest.raises(ValueError, match=r"max_baseline is 0\.01, expected at least 0.02"):
         synthetic.random_rig(0, max_baseline=0.01)
-    with pytest.raises(ValueError, match=r"depth.shape is \(3, 4\), expected .*\(240, 320\)"):
-        synthetic.end_point_error(small_rig(), small_rig(), np.ones((3, 4), np.float32))
     street = synthetic.Street(small_rig(), 1)
     with pytest.raises(ValueError, match="index is 1, expected"):
         street.frame(1)

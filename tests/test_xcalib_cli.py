@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import click
 import cv2
 import numpy as np
 import pytest
@@ -486,7 +487,9 @@ ONLY_PYTHON = {
 def test_the_options_are_those_of_the_python_command(
     cli: Callable[..., Process], command: str
 ) -> None:
-    theirs = {flag for option in python_command.commands[command].params for flag in option.opts}
+    python = python_command.get_command(click.Context(python_command), command)
+    assert python is not None
+    theirs = {flag for option in python.params for flag in option.opts}
     ours = set(re.findall(r"-[\w-]+", cli(command, "--help").stdout))
     assert {flag for flag in theirs - ours if flag.startswith("-")} == ONLY_PYTHON & theirs
 

@@ -15,7 +15,7 @@ from common import machine
 from figures import figure
 from night import NightRig
 
-from xcalib._core import choose_frames as draw_frames
+from xcalib._core import draw_frames
 from xcalib.choose import choose_informed
 from xcalib.evaluate import evaluate
 

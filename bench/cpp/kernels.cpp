@@ -149,7 +149,7 @@ void add_nec() {
     // Depth, and the reference's edges in x and y; the source.
     const double bytes = 12 * kPixels + 4 * kSourcePixels;
     const auto edge_share = [=] {
-        const auto rows = nec_rows(*frame, rig, kNumWithoutReference).residuals.size();
+        const auto rows = nec_rows(*frame, rig, Parameters(kNumWithoutReference)).residuals.size();
         return static_cast<double>(rows - 1) / 2 / kPixels;
     };
     add({"nec/value", kPixels, bytes,
@@ -157,7 +157,8 @@ void add_nec() {
     for (const int count : {int{kNumWithoutReference}, int{kNumParameters}})
         add({"nec/normal_equations/" + std::to_string(count), kPixels, bytes,
              [=] {
-                 benchmark::DoNotOptimize(nec_normal_equations(*frame, rig, count).gradient.sum());
+                 benchmark::DoNotOptimize(
+                     nec_normal_equations(*frame, rig, Parameters(count)).gradient.sum());
              },
              edge_share});
 }

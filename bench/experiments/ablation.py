@@ -1,7 +1,9 @@
 """Each part of the method off in turn. Parts: `night`, `rendered`."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from judge import counted_map, gain, judge, patch_cells, systematic
@@ -23,10 +25,11 @@ class Variant:
     off: tuple[str, ...] = ()
     masked: bool = True  # occluded pixels are not judged
 
-    def made(self) -> xcalib.CalibrationOptions:
+    def fit(self, calibrate: Callable, *where) -> xcalib.CalibrationResult:
+        """By `NightRig.fit` or `Rendered.calibrate`."""
+        parts = _core._Parts(**dict.fromkeys(self.off, False))
         options = xcalib.CalibrationOptions(**self.options)
-        options._parts = _core._Parts(**dict.fromkeys(self.off, False))
-        return options
+        return calibrate(*where, options=options, how=partial(_core._calibrate, parts))
 
 
 VARIANTS = {
@@ -55,7 +58,7 @@ def night_part(results: Results) -> None:
     rows = []
     for label, variant in results.in_time(list(VARIANTS.items())[: results.of(None, 1)]):
         start = time.perf_counter()
-        result = night.fit(night.filled, fit, variant.made())
+        result = variant.fit(night.fit, night.filled, fit)
         seconds = time.perf_counter() - start
         registrar = night.registrar(result.rig)
         judged = []
@@ -102,7 +105,7 @@ def rendered_part(results: Results) -> None:
             for label, variant in variants.items():
                 start = time.perf_counter()
                 try:
-                    result = scene.calibrate(variant.made())
+                    result = variant.fit(scene.calibrate)
                     error, converged = scene.error(result.rig), result.converged
                 except RuntimeError:  # nothing overlaps: as far from a rig as can be
                     error, converged = np.inf, False

@@ -21,6 +21,7 @@ from xcalib.footage import Picked
 from xcalib.footage.encoder import Encoder, join
 from xcalib.footage.opening import PickedDepth
 from xcalib.frames import write_image
+from xcalib.inputs import Inputs
 from xcalib.pipeline import Frames
 from xcalib.registration import Registration, RegistrationOptions, run_registration
 
@@ -103,7 +104,7 @@ def main() -> None:
         folder = Path(name)
         out = folder / ("out.mkv" if given.kind == "video" else "out")
         streams = write(folder, rig, given.frames, given.kind)
-        frames = Frames.open(*streams, str(folder / "depth"))
+        frames = Frames.open(Inputs(*streams, folder / "depth"))
         print(f"{given.frames} frames {rig.reference.width}x{rig.reference.height}, {given.kind}")
 
         rates: dict[bool, list[float]] = {True: [], False: []}

@@ -4,6 +4,7 @@
 #include "commands.hpp"
 #include "frame_benchmark.hpp"
 #include "xcalib/error.hpp"
+#include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
 
 namespace xcalib::cli {
@@ -23,16 +24,7 @@ std::pair<int, int> size_of(const std::string& flag, const std::string& text) {
     return {width, height};
 }
 
-const char* word_of(Occlusion occlusion) {
-    switch (occlusion) {
-        case Occlusion::ignore: return "ignore";
-        case Occlusion::mark: return "mark";
-        case Occlusion::hide: break;
-    }
-    return "hide";
-}
-
-const char* word_of(PixelType type) {
+const char* dtype_of(PixelType type) {
     switch (type) {
         case PixelType::u8: return "uint8";
         case PixelType::u16: return "uint16";
@@ -53,7 +45,7 @@ void run(const Arguments& a, Console& console) {
         console.line(to_text(r));
         console.result({{"reference_size", {rig.reference.width, rig.reference.height}},
                         {"source_size", {rig.source.width, rig.source.height}},
-                        {"type", word_of(r.benchmark.type)},
+                        {"type", dtype_of(r.benchmark.type)},
                         {"channels", r.benchmark.channels},
                         {"integer_depth", r.benchmark.integer_depth},
                         {"num_threads", r.benchmark.num_threads},

@@ -1,6 +1,5 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -11,6 +10,8 @@
 #include "xcalib/depth/fit_plane.hpp"
 #include "xcalib/draw_frames.hpp"
 #include "xcalib/footage/choose.hpp"
+#include "xcalib/judge/documents.hpp"
+#include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
 
 namespace xcalib::cli {
@@ -24,13 +25,6 @@ struct Arguments {
     bool explain = false, refine_plane = false;
     CalibrationOptions options;
 };
-
-const std::map<std::string, SearchMode> kSearchModes = {{"auto", SearchMode::automatic},
-                                                        {"full", SearchMode::full},
-                                                        {"local", SearchMode::local},
-                                                        {"off", SearchMode::off}};
-const std::map<std::string, FlowMode> kFlowModes = {
-    {"auto", FlowMode::automatic}, {"off", FlowMode::off}, {"patch", FlowMode::on}};
 
 // FX,FY,CX,CY [px], for images of a size that is not known yet.
 Pinhole intrinsics(const std::string& flag, const std::string& text) {
@@ -170,60 +164,6 @@ CalibrationResult calibrated(const Frames& frames, const Loaded& loaded,
     }
 }
 
-Json json_of(const CalibrationReport& report) {
-    constexpr double kDegree = 3.14159265358979323846 / 180;
-    Json candidates = Json::array(), levels = Json::array(), steps = Json::array();
-    for (const CandidateReport& c : report.candidates)
-        candidates.push_back({{"score", number(c.score)},
-                              {"correlation", number(c.correlation)},
-                              {"overlap", number(c.overlap)},
-                              {"refined_nec", number(c.refined_nec)},
-                              {"reference_hfov_deg", number(c.refined.reference.hfov() / kDegree)},
-                              {"source_hfov_deg", number(c.refined.source.hfov() / kDegree)}});
-    for (const LevelReport& l : report.levels)
-        levels.push_back({{"factor", l.factor},
-                          {"stage", l.stage},
-                          {"width", l.width},
-                          {"height", l.height},
-                          {"iterations", l.iterations},
-                          {"initial_cost", number(l.initial_cost)},
-                          {"final_cost", number(l.final_cost)},
-                          {"nec", number(l.nec)},
-                          {"aligned", number(l.aligned)},
-                          {"valid_share", number(l.valid_share)},
-                          {"condition_number", number(l.condition_number)},
-                          {"seconds", number(l.seconds)},
-                          {"stopped", l.stopped}});
-    for (const AdamStep& s : report.steps)
-        steps.push_back({{"learning_rate", number(s.learning_rate)},
-                         {"image", number(s.image)},
-                         {"flow", number(s.flow)},
-                         {"prior", number(s.prior)},
-                         {"total", number(s.total)}});
-    return {{"converged", report.converged},
-            {"message", report.message},
-            {"seconds", number(report.seconds)},
-            {"time",
-             {{"prepare", number(report.time.prepare)},
-              {"search", number(report.time.search)},
-              {"warp", number(report.time.warp)},
-              {"value", number(report.time.value)},
-              {"jacobian", number(report.time.jacobian)},
-              {"solver", number(report.time.solver)}}},
-            {"working_width", report.working_width},
-            {"working_height", report.working_height},
-            {"nec", number(report.nec)},
-            {"baseline_nec", number(report.baseline_nec)},
-            {"contrast", number(report.contrast)},
-            {"repeatability_px", number(report.repeatability_px)},
-            {"visible_shift_px", number(report.visible_shift_px)},
-            {"valid_share", number(report.valid_share)},
-            {"frames", report.frames},
-            {"candidates", candidates},
-            {"levels", levels},
-            {"steps", steps}};
-}
-
 void check(const Arguments& a) {
     if (a.reference_intrinsics && (a.options.reference_hfov_deg || a.options.optimize_reference))
         throw InputError(
@@ -243,16 +183,15 @@ void check(const Arguments& a) {
         throw InputError("--flow " + a.flow +
                          ": networks are run by the Python command, `xcalib`; expected auto, off or"
                          " patch");
-    if (!kFlowModes.count(a.flow))
-        throw InputError("--flow is '" + a.flow + "', expected auto, off or patch");
+    value_of("--flow", a.flow, flow_arguments());
 }
 
 void run(Arguments a, Console& console) {
     check(a);
     CalibrationOptions& options = a.options;
-    options.search.mode = kSearchModes.at(a.search);
-    options.flow = kFlowModes.at(a.flow);
-    options.solver = a.solver == "adam" ? Solver::adam : Solver::ceres;
+    options.search.mode = value_of<SearchMode>("--search", a.search);
+    options.flow = value_of("--flow", a.flow, flow_arguments());
+    options.solver = value_of<Solver>("--solver", a.solver);
     std::optional<Pinhole> reference_camera, source_camera;
     if (a.reference_intrinsics)
         reference_camera = intrinsics("--reference-intrinsics", *a.reference_intrinsics);
@@ -306,15 +245,14 @@ void run(Arguments a, Console& console) {
     save_rig(result.rig, a.output);
     console.line(result.report.brief());
     console.line("rig: " + a.output);
-    Json files = Json::array();
+    std::vector<std::string> files;
     for (const int index : loaded.indices) files.push_back(frames.references->where(index));
-    Json document{{"format", "xcalib-report"}, {"version", 1}, {"rig", a.output}, {"files", files}};
-    document.update(json_of(result.report));
+    const std::string document = report_document(result.report, a.output, files);
     if (!a.report.empty()) {
-        write_file(a.report, document.dump(2, ' ', true, Json::error_handler_t::replace) + "\n");
+        write_file(a.report, document);
         console.line("report: " + a.report);
     }
-    console.result(document);
+    console.result(Json::parse(document));
     if (!result.converged) throw NotTrusted(result.report.message);
 }
 
@@ -356,7 +294,7 @@ void add_calibrate(CLI::App& app, Console& console) {
                      "Global search before refinement: full, local (around the initial rig), off,"
                      " or auto.")
         ->type_name("HOW")
-        ->check(CLI::IsMember({"auto", "full", "local", "off"}))
+        ->check(CLI::IsMember(names_of(words<SearchMode>())))
         ->capture_default_str();
     command
         ->add_option("--flow", a.flow,
@@ -367,7 +305,7 @@ void add_calibrate(CLI::App& app, Console& console) {
     command
         ->add_option("--solver", a.solver, "ceres, or adam: the paper's, which searches nothing.")
         ->type_name("NAME")
-        ->check(CLI::IsMember({"ceres", "adam"}))
+        ->check(CLI::IsMember(names_of(words<Solver>())))
         ->capture_default_str();
     command
         ->add_option("--reference-intrinsics", a.reference_intrinsics,

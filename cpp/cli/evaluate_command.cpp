@@ -4,7 +4,7 @@
 #include "commands.hpp"
 #include "files.hpp"
 #include "frames.hpp"
-#include "xcalib/judge/evaluate.hpp"
+#include "xcalib/judge/documents.hpp"
 #include "xcalib/rig_file.hpp"
 
 namespace xcalib::cli {
@@ -16,34 +16,13 @@ struct Arguments {
     int width = 640, threads = 0;
 };
 
-Json json_of(const Scores& scores) {
-    Json out = Json::object();
-    for (std::size_t i = 0; i < scores.size(); ++i) out[kScoreNames[i]] = number(scores[i]);
-    return out;
-}
-
-Json json_of(const Evaluation& evaluation) {
-    Scores gains;
-    for (std::size_t i = 0; i < gains.size(); ++i) gains[i] = evaluation.gain(i);
-    Json frames = Json::array();
-    for (const auto& [registered, unregistered] : evaluation.frames)
-        frames.push_back(
-            {{"registered", json_of(registered)}, {"unregistered", json_of(unregistered)}});
-    return {{"size", Json::array({evaluation.width, evaluation.height})},
-            {"valid_share", number(evaluation.valid_share)},
-            {"registered", json_of(evaluation.registered)},
-            {"unregistered", json_of(evaluation.unregistered)},
-            {"gain_percent", json_of(gains)},
-            {"frames", frames}};
-}
-
 void run(const Arguments& a, Console& console) {
     const Rig rig = load_rig(a.rig);
     Frames frames = open_frames(a.frames, rig, console);
     if (!a.json_file.empty()) check_file_writable(a.json_file);
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
     Evaluator evaluator(rig, a.width, a.threads);
-    Json files = Json::array();
+    std::vector<std::string> files;
     for (int index = 0; index < frames.size(); ++index) {
         const Frame frame = frames.read(index);
         evaluator.add(view_of(frame.reference), view_of(frame.source), view_of(frame.depth));
@@ -52,11 +31,9 @@ void run(const Arguments& a, Console& console) {
     }
     const Evaluation result = evaluator.result();
     console.line(result.table());
-    Json document{{"rig", a.rig}, {"files", files}};
-    document.update(json_of(result));
-    if (!a.json_file.empty())
-        write_file(a.json_file, document.dump(2, ' ', true, Json::error_handler_t::replace) + "\n");
-    console.result(document);
+    const std::string document = evaluation_document(result, a.rig, files);
+    if (!a.json_file.empty()) write_file(a.json_file, document);
+    console.result(Json::parse(document));
     if (result.valid_share == 0)
         throw NotTrusted("no pixel is valid in " + std::to_string(frames.size()) +
                          " frames, nothing could be scored");

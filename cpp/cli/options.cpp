@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "xcalib/error.hpp"
+#include "xcalib/footage/pairing.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -65,7 +66,8 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
         .add_option("--pair", arguments.pairing,
                     "Pair frames by name, order or time; auto: by time where both have times.")
         ->type_name("HOW")
-        ->check(CLI::IsMember({"auto", "name", "order", "time"}))
+        ->check(
+            CLI::IsMember(std::vector<std::string>(kPairingMethods.begin(), kPairingMethods.end())))
         ->capture_default_str();
     command
         .add_option_function<std::string>(

@@ -1,20 +1,17 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "files.hpp"
 #include "registration.hpp"
+#include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
 
 namespace xcalib::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-const std::map<std::string, Occlusion> kOcclusions = {
-    {"ignore", Occlusion::ignore}, {"mark", Occlusion::mark}, {"hide", Occlusion::hide}};
 
 void check_output(const RegisterArguments& a) {
     const fs::path output = fs::weakly_canonical(a.output);
@@ -28,7 +25,7 @@ void check_output(const RegisterArguments& a) {
 }
 
 void run(RegisterArguments a, Console& console) {
-    a.options.occlusion = kOcclusions.at(a.occlusion);
+    a.options.occlusion = value_of<Occlusion>("--occlusion", a.occlusion);
     const Rig rig = load_rig(a.rig);
     Totals totals;
     if (a.live) {
@@ -102,7 +99,7 @@ void add_register(CLI::App& app, Console& console) {
                      "What the source sees something nearer in front of: told by the mask (mark),"
                      " or black as well (hide).")
         ->type_name("HOW")
-        ->check(CLI::IsMember({"ignore", "mark", "hide"}))
+        ->check(CLI::IsMember(names_of(words<Occlusion>())))
         ->capture_default_str();
     add_threads(*command, a.options.num_threads);
     CLI::Option* live = command->add_flag("--live", a.live, "REFERENCE and SOURCE are cameras.");

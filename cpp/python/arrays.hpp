@@ -1,10 +1,11 @@
-// numpy arrays as the core sees them.
+// numpy arrays as the core sees them, and back.
 #pragma once
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "xcalib/image.hpp"
@@ -13,12 +14,7 @@ namespace xcalib {
 
 namespace py = pybind11;
 
-inline std::string shape_text(const py::array& array) {
-    std::string text = "shape (";
-    for (py::ssize_t i = 0; i < array.ndim(); ++i)
-        text += (i ? ", " : "") + std::to_string(array.shape(i));
-    return text + ") " + std::string(py::str(array.dtype()));
-}
+std::string shape_text(const py::array& array);
 
 inline constexpr int kAligned = py::detail::npy_api::NPY_ARRAY_ALIGNED_;
 
@@ -29,46 +25,12 @@ struct Held {
     ImageView view;
 };
 
-inline Held image_of(const std::string& name, const py::object& object) {
-    const py::array given = py::array::ensure(object);
-    if (!given) throw py::value_error(name + " is not a numpy array");
-    PixelType type;
-    if (py::isinstance<py::array_t<std::uint8_t>>(given)) type = PixelType::u8;
-    else if (py::isinstance<py::array_t<std::uint16_t>>(given)) type = PixelType::u16;
-    else if (py::isinstance<py::array_t<float>>(given)) type = PixelType::f32;
-    else
-        throw py::value_error(name + " has " + shape_text(given) +
-                              ", expected dtype uint8, uint16 or float32");
-    const bool gray = given.ndim() == 2 || (given.ndim() == 3 && given.shape(2) == 1);
-    if (!gray && !(given.ndim() == 3 && given.shape(2) == 3))
-        throw py::value_error(name + " has " + shape_text(given) +
-                              ", expected shape (H, W) or (H, W, 3)");
-    if (given.size() == 0) throw py::value_error(name + " has " + shape_text(given) + ", is empty");
-    Held held;
-    held.array = py::array::ensure(given, py::array::c_style | kAligned);
-    held.view = {
-        held.array.data(),
-        static_cast<int>(held.array.shape(1)),
-        static_cast<int>(held.array.shape(0)),
-        gray ? 1 : 3,
-        type,
-        static_cast<std::ptrdiff_t>(held.array.shape(1) * (gray ? 1 : 3) * held.array.itemsize())};
-    return held;
-}
+// (H, W) or (H, W, 3) of uint8, uint16 or float32. Throws ValueError with shape and dtype.
+Held image_of(const std::string& name, const py::object& object);
 
 // Depth in metres: float32; float64 is converted. Integers are refused, they carry no unit, unless
 // the unit of uint16 is known.
-inline Held depth_of(const std::string& name, const py::object& object, bool unit_known = false) {
-    py::array given = py::array::ensure(object);
-    if (!given) throw py::value_error(name + " is not a numpy array");
-    if (py::isinstance<py::array_t<double>>(given)) given = py::array_t<float>::ensure(given);
-    const bool is_depth = py::isinstance<py::array_t<float>>(given) ||
-                          (unit_known && py::isinstance<py::array_t<std::uint16_t>>(given));
-    if (!is_depth || given.ndim() != 2 || given.size() == 0)
-        throw py::value_error(name + " has " + shape_text(given) +
-                              ", expected shape (h, w) float32 in metres");
-    return image_of(name, given);
-}
+Held depth_of(const std::string& name, const py::object& object, bool unit_known = false);
 
 struct HeldList {
     std::vector<Held> held;
@@ -84,6 +46,28 @@ HeldList list_of(const char* name, const py::sequence& sequence, const Convert& 
         list.views.push_back(list.held.back().view);
     }
     return list;
+}
+
+// A mask as one byte a pixel, nonzero where valid; None is everywhere.
+struct HeldMask {
+    py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast> array;
+    const std::uint8_t* data = nullptr;
+};
+HeldMask mask_of(const py::object& mask, int width, int height);
+
+template <class Value>
+py::array_t<Value> array_of(const std::vector<Value>& values, int width, int height) {
+    return py::array_t<Value>({height, width}, values.data());
+}
+inline py::array_t<float> array_of(const Image& image) {
+    return array_of(image.pixels, image.width, image.height);
+}
+
+// What the work gives, done without Python's lock.
+template <class Work>
+auto unlocked(const Work& work) {
+    const py::gil_scoped_release released;
+    return work();
 }
 
 }  // namespace xcalib

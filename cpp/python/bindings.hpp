@@ -1,11 +1,33 @@
-// The parts of the module, each in a file of its own.
+// The parts of the module: a file for each header of the core, which converts and calls, and
+// nothing else.
 #pragma once
 
 #include <pybind11/pybind11.h>
 
 namespace xcalib {
 
-void bind_footage(pybind11::module_& m);     // pairing, choice of frames, false colour, depth
-void bind_evaluation(pybind11::module_& m);  // scores, facts of a rig, pictures
+void bind_camera(pybind11::module_& m);
+void bind_calibration_options(pybind11::module_& m);
+void bind_calibration_report(pybind11::module_& m);
+void bind_calibrate(pybind11::module_& m);
+void bind_register(pybind11::module_& m);
+void bind_metrics(pybind11::module_& m);
+void bind_flow(pybind11::module_& m);
+
+void bind_pairing(pybind11::module_& m);
+void bind_clock_offset(pybind11::module_& m);
+void bind_fingerprint(pybind11::module_& m);
+void bind_choose(pybind11::module_& m);
+void bind_false_colour(pybind11::module_& m);
+
+void bind_plane_depth(pybind11::module_& m);
+void bind_fit_plane(pybind11::module_& m);
+void bind_complete_depth(pybind11::module_& m);
+void bind_steady_depth(pybind11::module_& m);
+
+void bind_evaluate(pybind11::module_& m);
+void bind_describe(pybind11::module_& m);
+void bind_documents(pybind11::module_& m);
+void bind_overlay(pybind11::module_& m);
 
 }  // namespace xcalib

@@ -5,26 +5,48 @@
 >>> image, mask = registrar.register(source, depth)
 """
 
-from importlib.metadata import version as _version
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from xcalib import metrics
-from xcalib._core import (
-    AdamOptions,
-    CalibrationOptions,
-    CalibrationReport,
-    CalibrationResult,
-    CandidateReport,
-    LevelReport,
-    Pinhole,
-    Registrar,
-    RelativeDepth,
-    Rig,
-    SearchOptions,
-    calibrate,
-)
-from xcalib.choose import choose_frames
+if TYPE_CHECKING:
+    from xcalib import metrics
+    from xcalib._core import (
+        AdamOptions,
+        CalibrationOptions,
+        CalibrationReport,
+        CalibrationResult,
+        CandidateReport,
+        LevelReport,
+        Pinhole,
+        Registrar,
+        RelativeDepth,
+        Rig,
+        SearchOptions,
+        calibrate,
+    )
+    from xcalib.choose import choose_frames
 
-__version__ = _version("xcalib-rgbt")
+    __version__: str
+else:
+
+    def __getattr__(name: str) -> Any:
+        """Import what a name stands for when it is first used: `xcalib --version` needs nothing."""
+        if name == "__version__":
+            value = import_module("importlib.metadata").version("xcalib-rgbt")
+        elif name == "metrics":
+            value = import_module("xcalib.metrics")
+        elif name == "choose_frames":
+            value = import_module("xcalib.choose").choose_frames
+        elif name in __all__:
+            value = getattr(import_module("xcalib._core"), name)
+        else:
+            raise AttributeError(f"module 'xcalib' has no attribute {name!r}")
+        globals()[name] = value
+        return value
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__, "__version__"})
+
 
 __all__ = [
     "AdamOptions",

@@ -362,7 +362,7 @@ class CalibrationResult:
     def report(self) -> CalibrationReport:
         """CalibrationReport."""
 
-def choose_frames(count: int, max_frames: int, seed: int) -> list[int]:
+def draw_frames(count: int, max_frames: int, seed: int) -> list[int]:
     """Indices of max_frames of count frames, spread over all, drawn with seed; sorted."""
 
 def calibrate(
@@ -975,15 +975,32 @@ class Evaluator:
     def result(self) -> Evaluation:
         """The Evaluation; ValueError without a frame."""
 
+def _option_words() -> dict[str, list[str]]:
+    """The words that each option of the command takes."""
+
+def _flow_arguments() -> dict[str, str]:
+    """CalibrationOptions.flow by what --flow of the command takes."""
+
+def report_document(report: CalibrationReport, rig_file: str, files: Sequence[str]) -> str:
+    """JSON text of a report, as `xcalib calibrate --report` writes it; files: those of its frames."""
+
+def evaluation_document(evaluation: Evaluation, rig_file: str, files: Sequence[str]) -> str:
+    """JSON text of an Evaluation, as `xcalib evaluate --json` writes it; files: those of its
+    frames.
+    """
+
+def rig_document(rig: Rig) -> str:
+    """JSON text of describe(), as `xcalib inspect --json` prints it."""
+
 def describe(rig: Rig) -> dict[str, Any]:
-    """What follows from the rig's parameters, in px, deg and m.
+    """The rig's parameters and what follows from them, in px, deg and m.
 
     rotation_deg turns the source camera out of the reference camera's axes: pan to the right,
     then tilt up, then roll clockwise. Parallax is the distance from the point at infinity.
     """
 
 def facts_text(rig: Rig) -> str:
-    """describe() and the cameras, as lines."""
+    """describe(), as lines."""
 
 def display_gray(image: NDArray[Any]) -> NDArray[uint8]:
     """Gray for the eye, (H, W) uint8: 1 to 99 % of the non-zero pixels stretched to 0 to 255."""

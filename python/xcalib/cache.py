@@ -1,4 +1,4 @@
-"""A folder of results that were costly to compute, found again by the hash of what made them."""
+"""A folder of results that were expensive to compute, found again by the hash of what made them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class ResultCache:
         return self.folder / key[:2] / f"{key}.npz"
 
     def load(self, key: str) -> dict[str, NDArray[Any]] | None:
-        """The arrays, or None; the zip's own check sums tell a damaged entry."""
+        """The arrays, or None; the zip's own checksums reveal a damaged entry."""
         try:
             with np.load(self._path(key), allow_pickle=False) as entry:
                 return {name: entry[name] for name in entry.files}

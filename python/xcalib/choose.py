@@ -1,4 +1,4 @@
-"""Which frames to calibrate on: those that say most about the rig together, see `Choice`."""
+"""Which frames to calibrate on: those that together determine the rig best, see `Choice`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Candidate", "Choice", "choose_frames", "choose_informed"]
 
 Floats = NDArray[np.float32]
 Read = Callable[[int], tuple[Image, Image, Floats | None]]
-"""Reference, source and depth (None: not known, or too dear to ask for) of one frame."""
+"""Reference, source and depth (None: not known, or too expensive to ask for) of one frame."""
 
 
 def choose_frames(
@@ -24,7 +24,7 @@ def choose_frames(
     max_frames: int = CalibrationOptions().max_frames,
     seed: int = CalibrationOptions().seed,
 ) -> Choice:
-    """The frames to give to `calibrate`: those that say most about the rig together.
+    """The frames to give to `calibrate`: those that together determine the rig best.
 
     >>> chosen = choose_frames(visible, thermal, depths).indices
     >>> given = ([images[i] for i in chosen] for images in (visible, thermal, depths))
@@ -83,7 +83,7 @@ def choose_informed(
     read: Read,
     watch: Callable[[list[int]], Iterator[int]] = iter,
 ) -> Choice:
-    """Choose at most ``max_frames`` of ``count`` frames by what they say about the rig.
+    """Choose at most ``max_frames`` of ``count`` frames by how well they determine the rig.
 
     Parameters
     ----------

@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from . import synthetic
+from . import metrics, synthetic
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig
 from .frames import Image, check_folder_writable, display_gray, overlay, size_of, write_image
+from .inputs import Inputs
 from .pipeline import Frames, progress, run_calibration, save_rig
 from .registration import RegistrationOptions, run_registration
 
@@ -41,7 +42,7 @@ def run_demo(
     rendered = synthetic.render(truth, num_frames=num_frames, seed=seed, night=night)
     synthetic.write(data, progress(rendered, num_frames, "rendering", quiet), truth)
 
-    everything = Frames.open(data / "visible", data / "thermal", str(data / "depth"))
+    everything = Frames.open(Inputs(data / "visible", data / "thermal", data / "depth"))
     # An earlier and longer demo may have left frames behind these.
     references, sources = everything.references[:num_frames], everything.sources[:num_frames]
     frames = Frames(references, sources, everything.depth)
@@ -67,7 +68,7 @@ def against_truth(rig: Rig, truth: Rig, frames: Frames) -> str:
     for index in range(len(frames)):
         reference, _, depth = frames.read(index)
         if size_of(depth) == size_of(reference):
-            error = synthetic.end_point_error(rig, truth, depth)
+            error = metrics.end_point_error(rig, truth, depth)
             errors.append(error[np.isfinite(error)])
     pixels = np.concatenate(errors)
     median, high = np.percentile(pixels, (50, 95)) if pixels.size else (math.nan, math.nan)

@@ -24,7 +24,7 @@ def evaluate(
     width: int = 640,
     num_threads: int = 0,
 ) -> Evaluation:
-    """Judge a rig on frames; they are taken one by one, so iterators do.
+    """Judge a rig on frames; they are taken one by one, so iterators will do.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 A provider is called with the reference image, the source image warped to its pixels, and the mask
 of where that is valid. It returns ``(flow, confidence)``: what reference pixel ``p`` shows is found
 at ``p + flow[p]`` in the warped source; ``flow`` is ``(H, W, 2)`` float32 [px], x then y,
-``confidence`` ``(H, W)`` float32 in [0, 1], 0 where nothing can be told.
+``confidence`` ``(H, W)`` float32 in [0, 1], 0 where the flow is unknown.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ MULTIPLE = 8
 
 @dataclass(frozen=True)
 class Preparation:
-    """What a network wants its images to be; the keys of the YAML file beside it, all optional."""
+    """How a network wants its images; the keys of the YAML file beside it, all optional."""
 
     range: tuple[float, float] = (0.0, 255.0)
     """Values that black and white become, before mean and deviation."""
@@ -71,7 +71,7 @@ class Preparation:
     std: tuple[float, ...] = (1.0,)
     """Each channel is divided by this: one number, or one a channel."""
     flow_from: int = 1
-    """The input, 1 or 2, on whose pixels the flow stands: it leads to the other one."""
+    """The input, 1 or 2, whose pixels the flow is given for; it leads to the other one."""
 
     @staticmethod
     def read(path: Path) -> Preparation:
@@ -186,15 +186,15 @@ class NetworkFlow:
         there, back = self._run(reference, warped), self._run(warped, reference)
         x, y = np.meshgrid(*(np.arange(side, dtype=np.float32) for side in size))
         at_x, at_y = x + there[..., 0], y + there[..., 1]
-        told = (at_x >= 0) & (at_y >= 0) & (at_x <= size[0] - 1) & (at_y <= size[1] - 1)
-        # Not finite is not told; the places are cleaned because resampling takes numbers only.
-        at_x, at_y = np.where(told, at_x, 0), np.where(told, at_y, 0)
+        inside = (at_x >= 0) & (at_y >= 0) & (at_x <= size[0] - 1) & (at_y <= size[1] - 1)
+        # NaN is not inside; the places are cleaned because resampling takes numbers only.
+        at_x, at_y = np.where(inside, at_x, 0), np.where(inside, at_y, 0)
         if valid is not None:
             known = (valid != 0).astype(np.float32)
-            told &= cv2.remap(known, at_x, at_y, cv2.INTER_LINEAR) > 0.999
+            inside &= cv2.remap(known, at_x, at_y, cv2.INTER_LINEAR) > 0.999
         returned = cv2.remap(back, at_x, at_y, cv2.INTER_LINEAR)
         agreement = 1 - np.linalg.norm(there + returned, axis=-1) / self.tolerance
-        confidence = np.where(told, np.nan_to_num(agreement).clip(0, 1), 0)
+        confidence = np.where(inside, np.nan_to_num(agreement).clip(0, 1), 0)
         return np.nan_to_num(there, posinf=0, neginf=0), confidence.astype(np.float32)
 
     def _run(self, start: Image, end: Image) -> Flow:

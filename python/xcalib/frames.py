@@ -11,7 +11,6 @@ Nothing half-written: a file appears under its name only when it is complete.
 from __future__ import annotations
 
 import contextlib
-import os
 import tempfile
 import threading
 from collections.abc import Collection, Iterator, Sequence
@@ -23,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core import InputError, Rig, display_gray, natural_order, overlay, pair_files
+from .whole_file import WholeFile
 
 Image = NDArray[Any]
 Size = tuple[int, int]
@@ -118,7 +118,7 @@ _quiet_level, _quiet_users = 0, 0
 
 @contextlib.contextmanager
 def quiet_opencv() -> Iterator[None]:
-    """Without OpenCV's own words on a bad file: they would come between our line and its reader.
+    """Keep OpenCV from printing messages of its own on a bad file, beside our one line.
 
     The level is the whole process's: the first thread in takes it down, the last one out back up.
     """
@@ -207,7 +207,7 @@ def check_folder_writable(folder: str | Path) -> None:
     if not base.is_dir():
         raise InputError(f"cannot write to {folder}: {base} is a file, expected a folder")
     try:
-        # Only an attempt tells: access rights say nothing of read-only and special file systems.
+        # Only an attempt shows it: access rights do not reveal read-only and special file systems.
         with tempfile.TemporaryFile(dir=base):
             pass
     except OSError as error:
@@ -226,15 +226,12 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file whole or not at all, and make its folder."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        partial.write_bytes(data)
-        os.replace(partial, path)
+        with WholeFile(path) as partial:
+            partial.write_bytes(data)
     except OSError as error:
-        # A full disk names no file, and nobody knows ours.
+        # A full disk names no file, and the user does not know the partial one.
         raise OSError(error.errno, error.strerror, str(path)) from None
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def write_image(path: str | Path, image: Image) -> None:

@@ -1,4 +1,4 @@
-"""What a rig says, in units one can picture."""
+"""The facts of a rig, in units one can picture."""
 
 from __future__ import annotations
 

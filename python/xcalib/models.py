@@ -1,4 +1,4 @@
-"""Model files: fetched once, checked ever after.
+"""Model files: fetched once, checked after that.
 
 The model folder holds the files and ``index.json``, which names where each came from and the hash
 it had when it came. There is no list of hashes to compare with: the first fetch is trusted, and
@@ -20,6 +20,7 @@ from urllib.parse import unquote, urlsplit
 from .cache import file_hash
 from .depth.recipes import RECIPES
 from .frames import InputError, write_bytes
+from .whole_file import WholeFile
 
 CHUNK = 1 << 20
 TIMEOUT = 30
@@ -110,18 +111,20 @@ def fetch(
         return path
 
     folder.mkdir(parents=True, exist_ok=True)
-    partial = folder / f".{name}.partial"
+    # Not discarded where the transfer fails: the next one resumes it.
+    file = WholeFile(path, folder / f".{name}.partial")
+    partial = file.partial
     _transfer(url, partial, show)
     found = file_hash(partial)
     if known_hash is not None and found != known_hash:
-        partial.unlink()
+        file.discard()
         raise InputError(
             f"{url}: sha256 is {found}, expected {known_hash} as when it was first fetched"
         )
     index[name] = {"url": url, "sha256": found, "bytes": partial.stat().st_size}
     document = {"format": "xcalib-models", "version": 1, "files": index}
     write_bytes(folder / "index.json", (json.dumps(document, indent=2) + "\n").encode())
-    os.replace(partial, path)
+    file.keep()
     return path
 
 
@@ -148,7 +151,7 @@ def _check(path: Path, expected: str) -> None:
 
 
 def _transfer(url: str, partial: Path, show: Callable[[int, int | None], None] | None) -> None:
-    """Append to ``partial`` what it lacks, or begin anew where the server has another file now."""
+    """Append to ``partial`` what it lacks, or start over where the server has another file now."""
     tag = partial.with_name(f"{partial.name}.etag")
     request = urllib.request.Request(url)
     have = partial.stat().st_size if partial.exists() and tag.exists() else 0

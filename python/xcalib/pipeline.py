@@ -1,4 +1,4 @@
-"""From frames on disk to a rig, with progress bars on stderr. `registration` goes on from there."""
+"""From frames on disk to a rig, with progress bars on stderr; `registration` is what follows."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,29 +19,19 @@ from ._core import (
     Choice,
     Rig,
     calibrate,
-    choose_frames,
-    fit_plane,
+    draw_frames,
     frames_to_judge_plane,
 )
 from .choose import choose_informed
-from .depth import (
-    PNG_SCALE,
-    DepthProvider,
-    FolderDepth,
-    MeasuredDepth,
-    NetworkDepth,
-    NetworkOptions,
-    PlaneDepth,
-)
+from .depth import DepthProvider, FolderDepth, PlaneDepth
 from .flow import FlowProvider
-from .footage import Matching, Pairs, Stream, TopicDepth, open_pairs
+from .footage import Pairs, Stream, TopicDepth, open_pairs
 from .footage.opening import PickedDepth
 from .frames import DecodeError, Image, InputError, fit_rig, size_of
+from .inputs import Inputs
 from .thermal import scalar_sources
 
 T = TypeVar("T")
-
-PLANE = PlaneDepth()
 
 
 def progress(items: Iterable[T], total: int, what: str, quiet: bool = False) -> Iterator[T]:
@@ -63,52 +53,19 @@ class Frames:
     """What the pairing by time found, a line each."""
 
     @staticmethod
-    def open(
-        reference: Path,
-        source: Path,
-        depth_spec: str,
-        depth_scale: float = PNG_SCALE,
-        camera_height: float = PLANE.camera_height,
-        horizon: float = PLANE.horizon,
-        far: float = PLANE.far,
-        plane_hfov: float = PLANE.hfov_deg,
-        plane_roll: float = PLANE.roll_deg,
-        depth_recipe: str | None = None,
-        depth_focal: float | None = None,
-        inverse_scale: float | None = None,
-        inverse_shift: float | None = None,
-        providers: str = "cpu",
-        threads: int = 0,
-        pairing: str = Matching.method,
-        time_offset: float | None = Matching.time_offset,
-        max_gap: float | None = Matching.max_gap,
-        reference_times: Path | None = None,
-        source_times: Path | None = None,
-        rig: Rig | None = None,
-        **measured: Any,
-    ) -> Frames:
-        """Open frames as the arguments of the commands name them; the rest is `MeasuredDepth`.
-
-        With a ``rig`` an estimated clock offset is refined, see `Pairs.refined`.
+    def open(inputs: Inputs, rig: Rig | None = None) -> Frames:
+        """Open and pair frames. With a ``rig`` an estimated clock offset is refined, see
+        `Pairs.refined`.
         """
-        matching = Matching(pairing, time_offset, max_gap, reference_times, source_times)
-        pairs = open_pairs(reference, source, matching)
-        plane = PlaneDepth(camera_height, horizon, far, plane_hfov, plane_roll)
-        network = NetworkOptions(
-            depth_recipe,
-            depth_focal,
-            inverse_scale,
-            inverse_shift,
-            providers,
-            threads,
-        )
-        given = depth_scale, plane, network, MeasuredDepth(**measured)
+        pairs = open_pairs(inputs.reference, inputs.source, inputs.matching)
 
         def open_depth(pairs: Pairs) -> DepthProvider:
-            depth = pairs.open_depth(depth_spec, *given)
-            network = relative_network(depth)
+            depth = pairs.open_depth(
+                str(inputs.depth), inputs.depth_scale, inputs.plane, inputs.network, inputs.measured
+            )
+            network = depth.relative
             if network is not None and rig is not None:
-                network.relative = rig.relative_depth
+                network.relative_depth = rig.relative_depth
             return depth
 
         if rig is not None:
@@ -129,7 +86,7 @@ class Frames:
     @property
     def given_depth(self) -> DepthProvider:
         """The provider itself, where `depth` only picks of its frames."""
-        return self.depth.depth if isinstance(self.depth, PickedDepth) else self.depth
+        return self.depth.provider if isinstance(self.depth, PickedDepth) else self.depth
 
     def with_scalar_sources(self, colormap: str) -> tuple[Frames, str]:
         """The frames with false-colour sources turned back to numbers, and a line on it or ''."""
@@ -137,20 +94,13 @@ class Frames:
         return replace(self, sources=sources), line
 
     def fit(self, rig: Rig) -> Rig:
-        """The rig at the size of these frames, which the first one tells."""
+        """The rig at the size of these frames, read from the first one."""
         return fit_rig(rig, size_of(self.references[0]), size_of(self.sources[0]))
-
-
-def relative_network(depth: object) -> NetworkDepth | None:
-    """The network behind a provider, where its depth has a scale and a shift to be estimated."""
-    while depth is not None and not isinstance(depth, NetworkDepth):
-        depth = getattr(depth, "depth", None) or getattr(depth, "provider", None)
-    return depth if depth is not None and depth.is_relative else None
 
 
 def misfit(depth: DepthProvider, rig: Rig) -> str:
     """A line where depth and rig do not go together, or ''."""
-    relative = relative_network(depth) is not None
+    relative = depth.relative is not None
     if relative and rig.relative_depth is None:
         return "depth is relative, the rig metric: its scale is guessed for every frame"
     if not relative and rig.relative_depth is not None:
@@ -159,7 +109,7 @@ def misfit(depth: DepthProvider, rig: Rig) -> str:
 
 
 def choose_by_content(frames: Frames, max_frames: int, seed: int, quiet: bool = False) -> Choice:
-    """The frames that say most about the rig, see `choose`. Depth counts where it is cheap."""
+    """The frames that determine the rig best, see `choose`. Depth counts where it is cheap."""
     cheap = isinstance(frames.given_depth, FolderDepth | PlaneDepth | TopicDepth)
 
     def read(index: int) -> tuple[Image, Image, NDArray[np.float32] | None]:
@@ -187,16 +137,16 @@ def run_calibration(
 
     ``prepare`` completes the options once the images, and so their sizes, are known. Without
     ``chosen`` the frames are spread over the footage by the seed. Frames that cannot be decoded
-    are left out, and ``warn`` is told how many; if none is left, `InputError` names the first.
-    ``flow`` is a provider for the flow term, None the built-in one.
+    are left out, and ``warn`` is called with their number; if none is left, `InputError` names the
+    first. ``flow`` is a provider for the flow term, None the built-in one.
     """
     if chosen is None:
-        chosen = choose_frames(len(frames), calibration.max_frames, calibration.seed)
-    network = relative_network(frames.depth)
+        chosen = draw_frames(len(frames), calibration.max_frames, calibration.seed)
+    network = frames.depth.relative
     if network is not None:
-        network.relative = initial.relative_depth if initial is not None else None
-        network.relative = network.relative or network.pooled(_readable(frames.references, chosen))
-        calibration.relative_depth = network.relative
+        start = initial.relative_depth if initial is not None else None
+        start = start or network.pooled(_readable(frames.references, chosen))
+        calibration.relative_depth = network.relative_depth = start
     loaded: list[tuple[int, tuple[Image, Image, NDArray[np.float32]]]] = []
     failures: list[DecodeError] = []
     for index in progress(chosen, len(chosen), "loading", quiet):
@@ -250,7 +200,7 @@ def with_fitted_plane(
     calibration: CalibrationOptions,
     quiet: bool = False,
 ) -> tuple[Frames, PlaneDepth]:
-    """The frames with the road plane that suits them best, see `fit_plane`, and that plane.
+    """The frames with the road plane that suits them best, see `PlaneDepth.fitted`, and that plane.
 
     Their depth must be a `PlaneDepth`, and ``rig`` fitted with it to the ``chosen`` frames.
     """
@@ -261,7 +211,7 @@ def with_fitted_plane(
     references = [frames.references[index] for index in chosen]
     sources = [frames.sources[index] for index in chosen]
     with tqdm(desc="plane", unit="fit", disable=True if quiet else None, leave=False) as bar:
-        fitted = fit_plane(references, sources, plane, rig, calibration, bar.update)
+        fitted = plane.fitted(references, sources, rig, calibration, bar.update)
     return replace(frames, depth=fitted), fitted
 
 

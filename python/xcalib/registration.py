@@ -22,8 +22,7 @@ from typing import Any
 from tqdm import tqdm
 
 from ._core import Registrar, Rig, absolute_path, file_stamp, fingerprint, rig_fingerprint
-from .depth import Depth, files_of, is_parallel
-from .depth.conditioning import SteadyDepth
+from .depth import Depth
 from .footage import Stream, is_video, journal_of, open_sink
 from .footage.encoder import encoder_name
 from .footage.pairing import median_period
@@ -217,7 +216,7 @@ def stages_of(
     return [
         Stage("decode", reference, many(frames.references.parallel)),
         Stage("decode", source, many(frames.sources.parallel)),
-        Stage("depth", depth, many(is_parallel(frames.depth))),
+        Stage("depth", depth, many(frames.depth.is_parallel)),
         Stage("warp", warp),
         Stage("encode", encode, many(sink.parallel)),
     ]
@@ -228,15 +227,8 @@ def frames_needed(frames: Frames, todo: Sequence[bool]) -> Iterator[int]:
     if not any(todo):
         return
     last = max(index for index, missing in enumerate(todo) if missing)
-    steady = is_steady(frames.depth)
+    steady = frames.depth.is_steady
     yield from (index for index in range(last + 1) if steady or todo[index])
-
-
-def is_steady(depth: object) -> bool:
-    """Whether depth is averaged over frames."""
-    while depth is not None and not isinstance(depth, SteadyDepth):
-        depth = getattr(depth, "depth", None) or getattr(depth, "provider", None)
-    return depth is not None
 
 
 # -- What a frame, and an output, is made of -----------------------------------------------------
@@ -250,13 +242,13 @@ def frame_keys(frames: Frames) -> list[str]:
 
     stamp = cache(file_stamp)
     keys: list[str] = []
-    steady = is_steady(frames.depth)
+    steady = frames.depth.is_steady
     for index in range(len(frames)):
         parts = [frames.references.name(index)]
         for images in (frames.references, frames.sources):
             file = images.file(index)
             parts += [*stamp(file), images.where(index).removeprefix(str(file))]
-        for file in files_of(frames.depth, index):
+        for file in frames.depth.files_of(index):
             parts += stamp(file)
         if steady and keys:
             parts.append(keys[-1])

@@ -76,7 +76,7 @@ struct Solved {
 
 Solved solve(const Scene& scene, const Rig& from, const CalibrationOptions& options) {
     Solved out{from, {}};
-    solve_adam(scene.images, options, nullptr, kNoProgress, out.rig, out.report);
+    solve_adam(scene.images, Plan(options), kNoProgress, out.rig, out.report);
     return out;
 }
 

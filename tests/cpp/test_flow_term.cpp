@@ -224,7 +224,7 @@ TEST(FlowTerm, LeadsTheSolverFromWhereEdgesDoNot) {
         options.flow = mode;
         Rig rig = away;
         const Level level = make_level(scene.images, 1, rig, 2);
-        solve_stage(scene.images, level, 2, 0.3, 1e-6, options, nullptr, rig);
+        solve_stage(scene.images, level, 2, 0.3, 1e-6, Plan(options), rig);
         return end_point_error(scene, rig);
     };
     ASSERT_GT(end_point_error(scene, away), 10.0);

@@ -72,7 +72,7 @@ TEST(RelativeDepth, TheImagesTellTheShiftIfTheSourceIsKnown) {
     options.source_camera = scene.truth.source;
     const WorkingImages wrong = with_shifted_depth(scene.images, 0.04);
     Rig rig = turned(scene.truth, {0.002, -0.003, 0.001});
-    const double shift = best_shift(wrong, options, farthest_inverse_depth(wrong), rig);
+    const double shift = best_shift(wrong, Plan(options), farthest_inverse_depth(wrong), rig);
     EXPECT_NEAR(shift, -0.04, 0.01);
     EXPECT_EQ(rig.source.fx, scene.truth.source.fx);
     EXPECT_LT(end_point_error(scene, rig), 0.1);

@@ -165,13 +165,13 @@ TEST(Search, CandidatesComeBestFirstAreDistinctAndNoMoreThanAskedFor) {
     const Scene scene = make_scene(6, 50, {2, 3, 0});
     SearchSpace space = space_around(scene);
     for (const int most : {1, 5}) {
-        space.candidates = most;
+        space.options.candidates = most;
         const auto found =
             global_search(edge_maps(scene.references), edge_maps(scene.sources), space, 2);
         ASSERT_FALSE(found.empty());
         EXPECT_LE(found.size(), static_cast<std::size_t>(most));
         for (std::size_t i = 0; i < found.size(); ++i) {
-            EXPECT_GE(found[i].overlap, space.min_overlap);
+            EXPECT_GE(found[i].overlap, space.options.min_overlap);
             EXPECT_LE(found[i].overlap, 1.01);
             EXPECT_LE(std::abs(found[i].correlation), 1.01);
             for (std::size_t k = 0; k < i; ++k) {

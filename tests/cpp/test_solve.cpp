@@ -21,7 +21,7 @@ CalibrationOptions options_with(int num_threads) {
 
 LevelReport solve(const Scene& scene, int stage, const CalibrationOptions& options, Rig& rig) {
     const Level level = make_level(scene.images, 1, rig, options.num_threads);
-    return solve_level(level, {}, stage, 0.3, 1e-6, options, rig, rig);
+    return solve_level(level, {}, stage, 0.3, 1e-6, Plan(options), rig, rig);
 }
 
 void expect_same_camera(const Pinhole& a, const Pinhole& b, double tolerance = 1e-9) {

@@ -48,9 +48,10 @@ TEST(Verdict, AFitThatFlowSeesToBeOffIsNotTrusted) {
     CalibrationReport report;
     report.valid_share = 0.9;
     report.levels.emplace_back().aligned = 1;
-    judge(scene.images, scene.truth, {}, report);
+    const Plan plan{CalibrationOptions{}};
+    judge(scene.images, scene.truth, plan, report);
     EXPECT_TRUE(report.converged) << report.message;
-    judge(scene.images, turned(scene.truth, {0.012, -0.012, 0.0}), {}, report);
+    judge(scene.images, turned(scene.truth, {0.012, -0.012, 0.0}), plan, report);
     EXPECT_FALSE(report.converged);
     EXPECT_GT(report.visible_shift_px, 3);
     EXPECT_NE(report.message.find("still sees a shift of"), std::string::npos) << report.message;

@@ -48,17 +48,6 @@ struct SearchOptions {
     int candidates = 12;         // peaks considered, >= 1
 };
 
-// Parts of the method, for a study of what each is worth (bench/experiments): all belong on.
-struct Parts {
-    bool images = true;         // the image loss; off, the flow term and the prior move the rig
-    bool pyramid = true;        // off: what the search has found and placed is solved at full size
-    bool stages = true;         // off: everything is free, without a prior, from the first level on
-    bool floor = true;          // of the objective's edges; off: they count however weak
-    bool pair_weights = true;   // c_i; off: every pair counts alike
-    bool normalization = true;  // photometric; off: gray values as given
-    bool depth_edges = true;    // are left out of the NEC at the finer levels; off: not
-};
-
 struct CalibrationOptions {
     int max_frames = 32;        // pairs used, spread over the footage, >= 1
     std::uint32_t seed = 0;     // of the frame choice
@@ -86,7 +75,6 @@ struct CalibrationOptions {
     SearchOptions search;
     Solver solver = Solver::ceres;
     AdamOptions adam;
-    Parts parts;
 
     void validate() const;  // throws std::invalid_argument: field, value, range
 };

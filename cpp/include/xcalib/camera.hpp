@@ -84,4 +84,8 @@ Eigen::Matrix3d infinite_homography(const Rig& rig);
 // The source camera turned where it stands, by exp(rotation) about its own axes [rad].
 Rig turn_source(const Rig& rig, const Eigen::Vector3d& rotation);
 
+// The unit quaternion of a rotation matrix. Throws std::invalid_argument where `R` is not one: R
+// R^T = I and det R = 1, within 1e-6.
+Eigen::Quaterniond rotation_of(const Eigen::Matrix3d& R);
+
 }  // namespace xcalib

@@ -8,6 +8,7 @@
 
 #include <vector>
 
+#include "xcalib/calibration_options.hpp"
 #include "xcalib/camera.hpp"
 #include "xcalib/edge_map.hpp"
 #include "xcalib/export.hpp"
@@ -26,10 +27,8 @@ struct SearchSpace {
     std::vector<SearchHypothesis> hypotheses;
     std::vector<double> rolls;                           // [rad]
     Eigen::Matrix3d base = Eigen::Matrix3d::Identity();  // rotation that the search is centred on
-    double max_shift = 0.0;    // of the reference's width on the map; 0: any
-    double min_overlap = 0.3;  // geometric mean of the shares of both images' edges
-    int map_width = 96;        // [px] of the reference
-    int candidates = 8;        // returned at most
+    double max_shift = 0.0;  // of the reference's width on the map; 0: any
+    SearchOptions options;   // min_overlap, map_width and candidates
 };
 
 struct SearchCandidate {

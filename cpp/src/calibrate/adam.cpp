@@ -102,12 +102,12 @@ struct BatchLoss {
 };
 
 BatchLoss batch_loss(const WorkingImages& images, const Level& level,
-                     const std::vector<std::size_t>& batch, const CalibrationOptions& options,
-                     const FlowEstimator& estimator, const Rig& rig) {
+                     const std::vector<std::size_t>& batch, const Plan& plan, const Rig& rig) {
+    const int num_threads = plan.options.num_threads;
     BatchLoss loss;
     const Rig at_level = level.rig_at(rig);
     std::vector<NecNormalEquations> equations(batch.size());
-    parallel_each(static_cast<int>(batch.size()), options.num_threads, [&](int i) {
+    parallel_each(static_cast<int>(batch.size()), num_threads, [&](int i) {
         equations[i] =
             level.pairs[batch[i]]->normal_equations(at_level, Parameters(kNumParameters));
     });
@@ -119,9 +119,9 @@ BatchLoss batch_loss(const WorkingImages& images, const Level& level,
         loss.image += weight * (1 - equations[i].value.nec);
         loss.image_gradient += weight * equations[i].gradient;
     }
-    if (options.flow == FlowMode::off) return loss;
+    if (!plan.uses_flow) return loss;
     const std::vector<FlowTargets> flow = estimate_flow(images.subset(batch), kFlowFactor, rig,
-                                                        estimator, kFlowShift, options.num_threads);
+                                                        plan.estimator, kFlowShift, num_threads);
     for (const FlowTargets& targets : flow) {
         const FlowEquations terms =
             flow_equations(targets, targets.rig, Parameters(kNumParameters));
@@ -199,9 +199,9 @@ Eigen::Matrix<double, kNumParameters, kNumPaperVariables> paper_jacobian(const P
     return jacobian;
 }
 
-void solve_adam(const WorkingImages& images, const CalibrationOptions& options,
-                const FlowEstimator& estimator, const std::function<void(double)>& progress,
-                Rig& rig, CalibrationReport& report) {
+void solve_adam(const WorkingImages& images, const Plan& plan,
+                const std::function<void(double)>& progress, Rig& rig, CalibrationReport& report) {
+    const CalibrationOptions& options = plan.options;
     const AdamOptions& schedule = options.adam;
     const Rig held = rig;
     const std::size_t batch_size = std::min<std::size_t>(schedule.batch, images.size());
@@ -224,7 +224,7 @@ void solve_adam(const WorkingImages& images, const CalibrationOptions& options,
             order.begin() + first, order.begin() + std::min(first + batch_size, order.size()));
         const int stage = step < fine_from ? 1 : 2;
         const PaperParameters paper = paper_of(x);
-        const BatchLoss loss = batch_loss(images, level, batch, options, estimator, rig);
+        const BatchLoss loss = batch_loss(images, level, batch, plan, rig);
         const Loss prior = prior_loss(paper, rig, held);
         const double gamma = stage == 1 ? options.prior_weight : 0.0;
         AdamStep told;

@@ -5,9 +5,7 @@
 #include <functional>
 
 #include "solve/working_images.hpp"
-#include "xcalib/calibration_options.hpp"
 #include "xcalib/calibration_report.hpp"
-#include "xcalib/flow.hpp"
 
 namespace xcalib {
 
@@ -31,8 +29,7 @@ Eigen::Matrix<double, kNumParameters, kNumPaperVariables> paper_jacobian(
 
 // From `rig`, which is replaced; writes the report's steps and levels. `progress` is told the share
 // of the steps taken.
-void solve_adam(const WorkingImages& images, const CalibrationOptions& options,
-                const FlowEstimator& estimator, const std::function<void(double)>& progress,
-                Rig& rig, CalibrationReport& report);
+void solve_adam(const WorkingImages& images, const Plan& plan,
+                const std::function<void(double)>& progress, Rig& rig, CalibrationReport& report);
 
 }  // namespace xcalib

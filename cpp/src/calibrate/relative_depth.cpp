@@ -104,8 +104,7 @@ double ordinary_shift(const Rig& rig, double farthest) {
     return minimum(strangeness, -kNearInfinity * farthest, 8 * farthest, 60, 40);
 }
 
-double best_shift(const WorkingImages& all_images, const CalibrationOptions& options,
-                  double farthest, Rig& rig) {
+double best_shift(const WorkingImages& all_images, const Plan& plan, double farthest, Rig& rig) {
     // What a shift leaves, once the rig is solved anew, is seen at full size only.
     constexpr std::size_t kFrames = 8;
     WorkingImages images = all_images.spread(kFrames);
@@ -113,17 +112,17 @@ double best_shift(const WorkingImages& all_images, const CalibrationOptions& opt
     if (images.parts.depth_edges)
         for (Image& depth : images.pyramid.at(1).depths) depth = without_depth_edges(depth);
     images.parts.depth_edges = false;
-    CalibrationOptions quick = options;
-    quick.max_iterations = std::min(options.max_iterations, 12);
-    const Level start = make_level(images, 1, rig, options.num_threads);
-    const double share_limit = 0.8 * pooled(start, rig, options.num_threads).valid_share;
+    Plan quick = plan;
+    quick.options.max_iterations = std::min(plan.options.max_iterations, 12);
+    const int num_threads = plan.options.num_threads;
+    const Level start = make_level(images, 1, rig, num_threads);
+    const double limit = share_limit(pooled(start, rig, num_threads).valid_share);
     Rig found = rig;
     double most = -INFINITY;
     const auto disagreement = [&](double shift) {
         Rig solved = found;  // from the best so far, the nearest that is known
-        const Level level =
-            make_level(with_shifted_depth(images, shift), 1, solved, options.num_threads);
-        const double nec = solve_level(level, {}, 2, share_limit, 1e-5, quick, found, solved).nec;
+        const Level level = make_level(with_shifted_depth(images, shift), 1, solved, num_threads);
+        const double nec = solve_level(level, {}, 2, limit, 1e-5, quick, found, solved).nec;
         if (nec > most) {
             most = nec;
             found = solved;

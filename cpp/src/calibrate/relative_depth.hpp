@@ -7,7 +7,6 @@
 #pragma once
 
 #include "solve/working_images.hpp"
-#include "xcalib/calibration_options.hpp"
 
 namespace xcalib {
 
@@ -24,8 +23,7 @@ double ordinary_shift(const Rig& rig, double farthest);
 
 // Where the source camera is known, the images tell: the shift at which the rig, solved anew for
 // each, aligns most edges. `rig` is replaced by the best.
-double best_shift(const WorkingImages& images, const CalibrationOptions& options, double farthest,
-                  Rig& rig);
+double best_shift(const WorkingImages& images, const Plan& plan, double farthest, Rig& rig);
 
 // Inverse depth that all but the farthest 2 % of what is known exceed [1/m].
 double farthest_inverse_depth(const WorkingImages& images);

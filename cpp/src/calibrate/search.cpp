@@ -219,7 +219,7 @@ std::vector<Peak> peaks_of(const CameraSpectra& reference, const CameraSpectra& 
             const double share_r = std::max(0.0, norm.real() / reference.total_energy);
             const double share_s = std::max(0.0, norm.imag() / source.total_energy);
             const double both = std::sqrt(share_r * share_s);
-            if (both < space.min_overlap) continue;
+            if (both < space.options.min_overlap) continue;
             const double value = numerator.at<Complex>(y, x).real() /
                                  (both * std::sqrt(reference.total_energy * source.total_energy));
             score.at<float>(y, x) = static_cast<float>(value);
@@ -299,7 +299,7 @@ std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& reference
     std::vector<double> steps;
     std::mutex mutex;
     const std::vector<EdgeMap> reference_maps =
-        reduced_for(references, static_cast<double>(references[0].width) / space.map_width);
+        reduced_for(references, static_cast<double>(references[0].width) / space.options.map_width);
     for (std::size_t r = 0; r < space.hypotheses.size(); ++r) {
         const SearchHypothesis& hypothesis = space.hypotheses[r];
         const std::size_t cameras = hypothesis.sources.size();
@@ -381,7 +381,7 @@ std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& reference
     });
     std::vector<SearchCandidate> kept;
     for (const Peak& peak : all) {
-        if (static_cast<int>(kept.size()) >= space.candidates) break;
+        if (static_cast<int>(kept.size()) >= space.options.candidates) break;
         SearchCandidate candidate;
         candidate.rig.reference = space.hypotheses[peak.reference].reference;
         candidate.rig.source = space.hypotheses[peak.reference].sources[peak.source];

@@ -25,9 +25,7 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
     constexpr double kRollStep = 4 * kDegree;
     const bool local = initial && options.search.mode != SearchMode::full;
     SearchSpace space;
-    space.min_overlap = options.search.min_overlap;
-    space.map_width = options.search.map_width;
-    space.candidates = options.search.candidates;
+    space.options = options.search;
 
     std::vector<Pinhole> cameras;
     if (options.reference_camera) {
@@ -265,18 +263,17 @@ Rig given_start(const ImageView& reference, const ImageView& source,
 }
 
 Start find_start(const WorkingImages& all_images, const ImageView& reference,
-                 const ImageView& source, const std::optional<Rig>& initial,
-                 const CalibrationOptions& options, const FlowEstimator& flow,
+                 const ImageView& source, const std::optional<Rig>& initial, const Plan& plan,
                  const std::function<void(double)>& progress) {
     constexpr std::size_t kFrames = 8, kFew = 6;
+    const CalibrationOptions& options = plan.options;
     const WorkingImages images = all_images.spread(kFrames);
     const int num_threads = options.num_threads;
     const double start = seconds_now();
     Start out;
 
     std::vector<SearchCandidate> found;
-    const bool searches = options.search.mode != SearchMode::off;
-    if (searches) {
+    if (plan.searches) {
         found = global_search(images.reference_edges, images.source_edges,
                               search_space(reference, source, initial, options), num_threads);
     } else {
@@ -290,7 +287,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     progress(0.4);
 
     const std::vector<Step> steps =
-        schedule(images.references[0].width, images.references[0].height, options.parts);
+        schedule(images.references[0].width, images.references[0].height, plan.parts);
     const int placing =
         schedule(images.references[0].width, images.references[0].height, {})[0].factor;
     const bool focal_free = !initial && !options.reference_camera && !options.reference_hfov_deg &&
@@ -310,37 +307,38 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         candidate.entry = out.candidates.size();
         // The search sees one displacement for all depths: where the middle depth is, it holds with
         // the given translation too.
-        if (searches && initial)
+        if (plan.searches && initial)
             candidate.rig = with_parallax(peak.rig, initial->t(), inverse.median);
         const Level level = make_level(few, placing, candidate.rig, num_threads);
-        if (searches) place(level, inverse, focal_free, options, candidate);
+        if (plan.searches) place(level, inverse, focal_free, options, candidate);
         const NecValue value = pooled(level, candidate.rig, num_threads);
-        if (!searches) candidate.merit = merit(value);
-        candidate.share_limit = 0.8 * value.valid_share;
+        if (!plan.searches) candidate.merit = merit(value);
+        candidate.share_limit = share_limit(value.valid_share);
         candidates.push_back(candidate);
         out.candidates.push_back(entry);
     }
     progress(0.5);
 
-    CalibrationOptions quick = options;  // enough to compare by; the winner is solved in full
-    quick.max_iterations = std::min(options.max_iterations, 30);
+    Plan quick = plan;  // enough to compare by; the winner is solved in full
+    quick.options.max_iterations = std::min(options.max_iterations, 30);
     constexpr double kTolerance = 3e-5;
 
     // Halving: each level costs four times the last, and tells more.
     for (std::size_t s = 0; s + 1 < steps.size() || s == 0; ++s) {
         if (s > 0 && steps[s].factor == 1) break;
-        // Flow is dear, and with one candidate nothing is compared: the refinement does the rest.
-        if (s > 0 && steps[s].stage == 2 && !searches && options.flow != FlowMode::off) break;
+        // Flow is expensive, and with one candidate nothing is compared: the refinement does the
+        // rest.
+        if (s > 0 && steps[s].stage == 2 && !plan.searches && plan.uses_flow) break;
         if (s == 0 || steps[s].factor != steps[s - 1].factor)
             keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
             candidate.levels.push_back(
-                searches && options.parts.images
+                plan.searches && plan.parts.images
                     ? solve_level(level, {}, steps[s].stage, candidate.share_limit, kTolerance,
                                   quick, candidate.rig, candidate.rig)
                     : solve_stage(images, level, steps[s].stage, candidate.share_limit, kTolerance,
-                                  quick, flow, candidate.rig));
+                                  quick, candidate.rig));
             candidate.merit = merit(candidate.levels.back());
             out.candidates[candidate.entry].refined = candidate.rig;
             out.candidates[candidate.entry].refined_nec = candidate.levels.back().nec;

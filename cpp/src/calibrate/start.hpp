@@ -6,9 +6,7 @@
 #include <vector>
 
 #include "solve/working_images.hpp"
-#include "xcalib/calibration_options.hpp"
 #include "xcalib/calibration_report.hpp"
-#include "xcalib/flow.hpp"
 
 namespace xcalib {
 
@@ -36,7 +34,7 @@ Rig given_start(const ImageView& reference, const ImageView& source,
 
 // `reference` and `source` give the sizes of the cameras.
 Start find_start(const WorkingImages& images, const ImageView& reference, const ImageView& source,
-                 const std::optional<Rig>& initial, const CalibrationOptions& options,
-                 const FlowEstimator& flow, const std::function<void(double)>& progress);
+                 const std::optional<Rig>& initial, const Plan& plan,
+                 const std::function<void(double)>& progress);
 
 }  // namespace xcalib

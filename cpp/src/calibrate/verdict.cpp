@@ -58,34 +58,34 @@ Level half_of(const Level& level, std::size_t first) {
 
 }  // namespace
 
-void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
+void judge(const WorkingImages& images, const Rig& rig, const Plan& plan,
            CalibrationReport& report) {
     constexpr double kDetail = 0.5, kContrast = 5.0, kRepeatability = 1.0, kShift = 3.0,
                      kShare = 0.05;
-    const Level level = make_level(images, kFactor, rig, options.num_threads);
-    const double here = pooled(level, rig, options.num_threads).nec;
-    const Baseline baseline = displaced(level, rig, options.num_threads);
+    const int num_threads = plan.options.num_threads;
+    const Level level = make_level(images, kFactor, rig, num_threads);
+    const double here = pooled(level, rig, num_threads).nec;
+    const Baseline baseline = displaced(level, rig, num_threads);
     report.baseline_nec = baseline.mean;
     report.contrast = baseline.deviation > 0 ? (here - baseline.mean) / baseline.deviation : 0.0;
 
     const std::size_t pairs = images.size();
     report.repeatability_px = INFINITY;
     if (pairs >= 2) {
-        CalibrationOptions quick = options;  // they start where all frames agree
-        quick.max_iterations = std::min(options.max_iterations, 12);
+        Plan quick = plan;  // they start where all frames agree
+        quick.options.max_iterations = std::min(plan.options.max_iterations, 12);
         Rig halves[2] = {rig, rig};
         for (std::size_t k = 0; k < 2; ++k)
-            solve_level(half_of(level, k), {}, 2, 0.8 * report.valid_share, 1e-5, quick, rig,
+            solve_level(half_of(level, k), {}, 2, share_limit(report.valid_share), 1e-5, quick, rig,
                         halves[k]);
         report.repeatability_px = median_distance(level, halves[0], halves[1]);
     }
 
-    report.visible_shift_px = visible_shift(images, rig, options.num_threads);
+    report.visible_shift_px = visible_shift(images, rig, num_threads);
 
     // Where the fit is some pixels off, coarse edges still meet and fine ones do not.
     const double coarse =
-        pooled(make_nec_level(images, kCoarse, rig, options.num_threads), rig, options.num_threads)
-            .aligned;
+        pooled(make_nec_level(images, kCoarse, rig, num_threads), rig, num_threads).aligned;
     const double fine = report.levels.back().aligned;
 
     report.converged = false;

@@ -2,14 +2,13 @@
 #pragma once
 
 #include "solve/working_images.hpp"
-#include "xcalib/calibration_options.hpp"
 #include "xcalib/calibration_report.hpp"
 
 namespace xcalib {
 
 // Fills converged, message, baseline_nec, contrast, repeatability_px and visible_shift_px of the
 // report.
-void judge(const WorkingImages& images, const Rig& rig, const CalibrationOptions& options,
+void judge(const WorkingImages& images, const Rig& rig, const Plan& plan,
            CalibrationReport& report);
 
 }  // namespace xcalib

@@ -298,8 +298,14 @@ Pairing pair_frames(const FrameList& references, const FrameList& sources, const
     const bool files = !references.paths.empty() && !sources.paths.empty();
     if (method == "auto")
         method = references.times && sources.times ? "time" : files ? "name" : "order";
-    if (method != "name" && method != "order" && method != "time")
-        throw InputError("pairing is '" + method + "', expected one of auto, name, order, time");
+    // What `auto` stands for is decided by now.
+    if (std::find(kPairingMethods.begin() + 1, kPairingMethods.end(), method) ==
+        kPairingMethods.end()) {
+        std::string known;
+        for (const char* one : kPairingMethods)
+            known += (known.empty() ? "" : ", ") + std::string(one);
+        throw InputError("pairing is '" + method + "', expected one of " + known);
+    }
     if (offset != 0 && method != "time")
         throw InputError(
             format("a clock offset of %g s needs frames paired by time; they are by %s", offset,

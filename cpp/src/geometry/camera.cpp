@@ -1,5 +1,6 @@
 #include "xcalib/camera.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -134,6 +135,13 @@ Rig turn_source(const Rig& rig, const Eigen::Vector3d& rotation) {
 
 Eigen::Matrix3d infinite_homography(const Rig& rig) {
     return rig.source.K() * rig.R() * rig.reference.K().inverse();
+}
+
+Eigen::Quaterniond rotation_of(const Eigen::Matrix3d& R) {
+    if (!((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6 && R.determinant() > 0))
+        throw std::invalid_argument(
+            "R is not a rotation matrix (R R^T = I, det R = 1 within 1e-6)");
+    return Eigen::Quaterniond(R).normalized();
 }
 
 }  // namespace xcalib

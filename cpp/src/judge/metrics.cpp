@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "base/parallel.hpp"
 #include "photometry/mat.hpp"
@@ -34,6 +36,12 @@ struct Correlation {
     }
 };
 
+void require_range(double data_range) {
+    if (!(data_range > 0))
+        throw std::invalid_argument("data_range is " + std::to_string(data_range) +
+                                    ", expected > 0");
+}
+
 }  // namespace
 
 double gc(const Image& reference, const Image& registered, const std::uint8_t* valid) {
@@ -54,6 +62,7 @@ double gc(const Image& reference, const Image& registered, const std::uint8_t* v
 
 double ssim(const Image& reference, const Image& registered, const std::uint8_t* valid,
             double data_range) {
+    require_range(data_range);
     constexpr double kSigma = 1.5;
     constexpr int kRadius = 5;  // 3.5 sigma, as scikit-image truncates it
     const double c1 = 0.01 * data_range * 0.01 * data_range;
@@ -113,6 +122,7 @@ double rmse(const Image& reference, const Image& registered, const std::uint8_t*
 
 double psnr(const Image& reference, const Image& registered, const std::uint8_t* valid,
             double data_range) {
+    require_range(data_range);
     return 20 * std::log10(data_range / rmse(reference, registered, valid));
 }
 

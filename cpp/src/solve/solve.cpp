@@ -124,10 +124,11 @@ LevelReport report_on(const Level& level, int stage, const Rig& rig, int num_thr
 }
 
 LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow, int stage,
-                        double share_limit, double tolerance, const CalibrationOptions& options,
-                        const Rig& anchor, Rig& rig) {
+                        double share_limit, double tolerance, const Plan& plan, const Rig& anchor,
+                        Rig& rig) {
     const double start = seconds_now();
-    if (!options.parts.images && flow.empty())
+    const CalibrationOptions& options = plan.options;
+    if (!plan.parts.images && flow.empty())
         return report_on(level, stage, rig, options.num_threads);
     SolverParameters p = solver_from_rig(rig);
     const SolverParameters held = solver_from_rig(anchor);
@@ -135,7 +136,7 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
     const Parameters free = free_parameters(stage, options);
-    for (std::size_t i = 0; i < level.pairs.size() && options.parts.images; ++i)
+    for (std::size_t i = 0; i < level.pairs.size() && plan.parts.images; ++i)
         problem.AddResidualBlock(
             new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free), nullptr,
             blocks);
@@ -181,11 +182,9 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
 }
 
 LevelReport solve_stage(const WorkingImages& images, const Level& level, int stage,
-                        double share_limit, double tolerance, const CalibrationOptions& options,
-                        const FlowEstimator& estimator, Rig& rig) {
-    const bool searches = options.search.mode != SearchMode::off;
-    if (options.flow == FlowMode::off || (options.flow == FlowMode::automatic && searches))
-        return solve_level(level, {}, stage, share_limit, tolerance, options, rig, rig);
+                        double share_limit, double tolerance, const Plan& plan, Rig& rig) {
+    if (!plan.uses_flow)
+        return solve_level(level, {}, stage, share_limit, tolerance, plan, rig, rig);
     // Coarse levels are too small for patches, and may have far to go.
     const bool coarse = level.factor >= kCoarse;
     const int factor = coarse ? kCoarse / 2 : level.factor;
@@ -194,12 +193,12 @@ LevelReport solve_stage(const WorkingImages& images, const Level& level, int sta
     const double start = seconds_now();
     const Rig anchor = rig;
     LevelReport report;
-    for (int round = 0; round < options.flow_rounds; ++round) {
+    for (int round = 0; round < plan.options.flow_rounds; ++round) {
         const Rig from = rig;
         const std::vector<FlowTargets> flow =
-            estimate_flow(images, factor, rig, estimator, max_shift, options.num_threads);
+            estimate_flow(images, factor, rig, plan.estimator, max_shift, plan.options.num_threads);
         const LevelReport before = report;
-        report = solve_level(level, flow, stage, share_limit, tolerance, options, anchor, rig);
+        report = solve_level(level, flow, stage, share_limit, tolerance, plan, anchor, rig);
         report.iterations += before.iterations;
         if (round > 0) report.initial_cost = before.initial_cost;
         if (median_distance(level, from, rig) < kSettled) break;

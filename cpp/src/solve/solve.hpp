@@ -2,10 +2,9 @@
 #pragma once
 
 #include "solve/flow_term.hpp"
+#include "solve/plan.hpp"
 #include "solve/working_images.hpp"
-#include "xcalib/calibration_options.hpp"
 #include "xcalib/calibration_report.hpp"
-#include "xcalib/flow.hpp"
 
 namespace xcalib {
 
@@ -17,18 +16,20 @@ NecValue pooled(const Level& level, const Rig& rig, int num_threads);
 // What a level says of a rig: all of the report that does not depend on how it was solved.
 LevelReport report_on(const Level& level, int stage, const Rig& rig, int num_threads);
 
+// The valid share below which a fit is penalised that starts where it is `valid_share`.
+inline double share_limit(double valid_share) { return 0.8 * valid_share; }
+
 // Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and a prior
 // that holds `anchor`, stage 2 everything free. A pair whose valid share falls below `share_limit`
 // is charged for it. It stops where a step lowers the cost by less than the share `tolerance`.
 LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow, int stage,
-                        double share_limit, double tolerance, const CalibrationOptions& options,
-                        const Rig& anchor, Rig& rig);
+                        double share_limit, double tolerance, const Plan& plan, const Rig& anchor,
+                        Rig& rig);
 
-// The same, with the flow term of Eq. (total_loss) where the options have it: flow is estimated
-// where `rig` is, held while the solver moves, and estimated anew.
+// The same, with the flow term of Eq. (total_loss) where the plan has it: flow is estimated where
+// `rig` is, held while the solver moves, and estimated anew.
 LevelReport solve_stage(const WorkingImages& images, const Level& level, int stage,
-                        double share_limit, double tolerance, const CalibrationOptions& options,
-                        const FlowEstimator& estimator, Rig& rig);
+                        double share_limit, double tolerance, const Plan& plan, Rig& rig);
 
 // Median distance between where two rigs send the pixels of a level, in reference pixels of the
 // working size.

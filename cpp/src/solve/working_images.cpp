@@ -98,16 +98,16 @@ Image without_depth_edges(const Image& depth) {
 WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<ImageView>& sources,
                                   const std::vector<ImageView>& depths,
-                                  const std::vector<int>& chosen,
-                                  const CalibrationOptions& options) {
+                                  const std::vector<int>& chosen, const Plan& plan) {
     const Clock::time_point start = Clock::now();
+    const CalibrationOptions& options = plan.options;
     const int reduction = (references[0].width + options.working_width - 1) / options.working_width;
     const int width = static_cast<int>(std::lround(references[0].width / double(reduction)));
     const int height = static_cast<int>(std::lround(references[0].height / double(reduction)));
     const std::size_t count = chosen.size();
-    const float floor = floor_of(options.parts);
+    const float floor = floor_of(plan.parts);
     WorkingImages images;
-    images.parts = options.parts;
+    images.parts = plan.parts;
     images.references.resize(count);
     images.sources.resize(count);
     images.reference_edges.resize(count);
@@ -119,12 +119,12 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
         const int frame = chosen[i];
         for_frame("reference", frame, [&] {
             images.references[i] = resize_area(to_gray(references[frame]), width, height);
-            if (options.parts.normalization)
+            if (plan.parts.normalization)
                 images.references[i] = normalize_dark(images.references[i]);
         });
         for_frame("source", frame, [&] {
             images.sources[i] = to_gray(sources[frame]);
-            if (options.parts.normalization)
+            if (plan.parts.normalization)
                 images.sources[i] = normalize_percentiles(images.sources[i]);
         });
         images.source_edges[i] = edge_map(images.sources[i], floor);

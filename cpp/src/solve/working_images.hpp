@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "objective/image_pair.hpp"
-#include "xcalib/calibration_options.hpp"
+#include "solve/plan.hpp"
 
 namespace xcalib {
 
@@ -43,8 +43,7 @@ void validate_frames(const std::vector<ImageView>& references,
 WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<ImageView>& sources,
                                   const std::vector<ImageView>& depths,
-                                  const std::vector<int>& chosen,
-                                  const CalibrationOptions& options);
+                                  const std::vector<int>& chosen, const Plan& plan);
 
 // Depth without its edges, for the NEC of the finer levels (at coarser ones nearly everything is
 // near an edge, and a pixel's width matters less; a patch of the flow is wider): across one, the

@@ -1,8 +1,8 @@
 """Depth of the reference frames: from files, from a network, or from a prior on the road.
 
-A provider is called with the index of a frame and its reference image and returns the depth map
-``(h, w)`` float32 in metres along the optical axis, 0 where unknown. Its size is free, its aspect
-is that of the reference image.
+A `DepthProvider` is called with the index of a frame and its reference image and returns the depth
+map ``(h, w)`` float32 in metres along the optical axis, 0 where unknown. Its size is free, its
+aspect is that of the reference image.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from .._core import PlaneDepth
 from ..frames import InputError
 from .files import DEPTH_SUFFIXES, PNG_SCALE, FolderDepth, read_depth
 from .measured import MeasuredDepth
 from .network import NetworkDepth, NetworkOptions
-from .provider import Depth, DepthProvider, files_of, is_parallel
+from .plane import PlaneDepth
+from .provider import Depth, DepthProvider, WrappedDepth
 
 __all__ = [
     "DEPTH_SUFFIXES",
@@ -27,8 +27,7 @@ __all__ = [
     "NetworkDepth",
     "NetworkOptions",
     "PlaneDepth",
-    "files_of",
-    "is_parallel",
+    "WrappedDepth",
     "open_depth",
     "read_depth",
 ]

@@ -1,7 +1,7 @@
 """From sparse or semi-dense depth to dense, along the edges of the reference image.
 
-`bench/depth_completion.py` compares `complete` with others; docs/inputs_measured.md has the
-figures.
+`bench/accuracy/depth_completion.py` compares `complete` with others; docs/inputs_measured.md has
+the figures.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from .._core import complete_depth as complete
 from .._core import completed, completion_confidence
 from ..frames import Image, InputError
-from .provider import Depth, DepthProvider, is_parallel
+from .provider import Depth, WrappedDepth
 
 __all__ = ["MIN_CONFIDENCE", "CompletedDepth", "complete"]
 
@@ -19,10 +19,9 @@ MIN_CONFIDENCE = completion_confidence()
 
 
 @dataclass(frozen=True)
-class CompletedDepth:
+class CompletedDepth(WrappedDepth):
     """Depth of another provider, completed; pixels of low confidence stay unknown."""
 
-    provider: DepthProvider
     min_confidence: float = MIN_CONFIDENCE
     """Smallest confidence of a filled pixel, [0, 1]; 0 fills everything."""
 
@@ -31,11 +30,6 @@ class CompletedDepth:
             raise InputError(
                 f"completion confidence is {self.min_confidence:g}, expected between 0 and 1"
             )
-
-    @property
-    def parallel(self) -> bool:
-        """See `depth.is_parallel`."""
-        return is_parallel(self.provider)
 
     def __call__(self, index: int, reference: Image) -> Depth:
         return completed(self.provider(index, reference), reference, self.min_confidence)

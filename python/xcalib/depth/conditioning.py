@@ -1,4 +1,4 @@
-"""Depth made fit for video: steadied in time, and only where asked for."""
+"""Depth averaged over the frames of a video, where asked for."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ from dataclasses import dataclass, field
 
 from .._core import DepthSteadier
 from ..frames import Image
-from .provider import Depth, DepthProvider
+from .provider import Depth, WrappedDepth
 
 
-@dataclass
-class SteadyDepth:
+@dataclass(frozen=True)
+class SteadyDepth(WrappedDepth):
     """Depth of another provider, averaged over time along the image flow, see `DepthSteadier`.
 
-    Call it with consecutive frames. Any other frame starts it anew and passes as it is.
+    Call it with consecutive frames. Any other frame restarts the average and passes unchanged.
     """
 
-    provider: DepthProvider
+    is_parallel = False
+    is_steady = True
     _steadier: DepthSteadier = field(default_factory=DepthSteadier, init=False)
 
     def __call__(self, index: int, reference: Image) -> Depth:

@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import DecodeError, Image, InputError, decode, list_files, pair, same_aspect, size_of
-from .provider import Depth
+from .provider import Depth, DepthProvider
 
 DEPTH_SUFFIXES = (".png", ".npy", ".tif", ".tiff", ".exr")
 PNG_SCALE = 1 / 256
 """Metres per count of a 16-bit PNG (KITTI)."""
 
 
-class FolderDepth:
+class FolderDepth(DepthProvider):
     """Depth maps of a folder, one per reference image, paired with them by `frames.pair`."""
 
-    parallel = True
+    is_parallel = True
 
     def __init__(
         self, folder: str | Path, reference_paths: Sequence[Path], scale: float = PNG_SCALE
@@ -38,6 +38,9 @@ class FolderDepth:
     def __call__(self, index: int, reference: Image) -> Depth:
         path = self.paths[index]
         return fitting(read_depth(path, self.scale), reference, str(path))
+
+    def files_of(self, index: int) -> list[Path]:
+        return [self.paths[index]]
 
 
 def read_depth(path: str | Path, scale: float = PNG_SCALE) -> Depth:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..frames import Image, InputError, Size, list_files, pair, same_aspect, size_of
 from ..yaml_file import load_yaml
 from .points import POINT_SUFFIXES, Points, read_points
-from .provider import Depth
+from .provider import Depth, DepthProvider
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ SURROUNDINGS = 0.008
 
 @dataclass(frozen=True)
 class LidarCalibration:
-    """Where the reference camera stands to the lidar, and what it sees."""
+    """Pose of the reference camera relative to the lidar, and its intrinsics."""
 
     K: Array
     """Intrinsics of the reference camera ``(3, 3)`` [px], of images of ``image_size``."""
@@ -90,13 +90,13 @@ def without_hidden(depth: Depth) -> Depth:
     return np.where(hidden, np.float32(0), depth)
 
 
-class LidarDepth:
+class LidarDepth(DepthProvider):
     """Depth of a folder of scans, one per reference image, paired with them by `frames.pair`.
 
     ``calibration`` is one file for all, or a folder with one of KITTI's files per scan.
     """
 
-    parallel = True
+    is_parallel = True
 
     def __init__(
         self, folder: str | Path, reference_paths: Sequence[Path], calibration: str | Path
@@ -118,6 +118,9 @@ class LidarDepth:
                 " is the lidar calibration right?"
             )
         return without_hidden(depth)
+
+    def files_of(self, index: int) -> list[Path]:
+        return [self.paths[index]]
 
 
 # -- Calibration files ---------------------------------------------------------------------------

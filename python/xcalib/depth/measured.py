@@ -1,4 +1,4 @@
-"""What the commands say of measured depth: where it comes from, and what is done to it."""
+"""The options of measured depth: where it comes from, and what is done to it."""
 
 from __future__ import annotations
 

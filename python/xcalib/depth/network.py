@@ -19,7 +19,7 @@ from .._core import RelativeDepth
 from ..cache import ResultCache, file_hash
 from ..frames import Image, InputError, Size, same_aspect, size_of
 from ..onnx import ImageInput, Network
-from .provider import Depth, reciprocal
+from .provider import Depth, DepthProvider, reciprocal
 from .recipes import Recipe, find_recipe
 
 Array = NDArray[np.float32]
@@ -31,7 +31,7 @@ FAR, NEAR = 80.0, 2.0
 FARTHEST = 1e4
 """What relative depth says lies beyond infinity is as far as this [m]."""
 STEP = 0.1
-"""Depths that differ by more than this share are of two surfaces: nothing lies between them."""
+"""Depths that differ by more than this share belong to two surfaces: nothing lies between them."""
 
 _INTERPOLATION = {
     "linear": cv2.INTER_LINEAR,
@@ -42,7 +42,7 @@ _INTERPOLATION = {
 
 @dataclass(frozen=True)
 class NetworkOptions:
-    """How to run a depth network; what the command line says of it."""
+    """How to run a depth network: the options of the command line."""
 
     recipe: str | None = None
     """Name of the recipe, where no file beside the model names one."""
@@ -61,7 +61,7 @@ class NetworkOptions:
 
 @dataclass(frozen=True)
 class _Raw:
-    """What the network said of one image, without the border of a letterbox."""
+    """The network's output for one image, without the border of a letterbox."""
 
     values: Array
     focal: float
@@ -70,8 +70,8 @@ class _Raw:
     """Width the image had there [px]."""
 
 
-class NetworkDepth:
-    """Monocular depth of reference images, `DepthProvider`.
+class NetworkDepth(DepthProvider):
+    """Monocular depth of reference images.
 
     Results are kept in the user's cache, by the hash of model, recipe and image.
 
@@ -99,7 +99,7 @@ class NetworkDepth:
         if options.shift is not None:
             recipe = dataclasses.replace(recipe, shift=options.shift)
         self.recipe = recipe
-        self.relative: RelativeDepth | None = None
+        self.relative_depth: RelativeDepth | None = None
         """Scale and shift of relative depth, of a rig; None guesses them for every frame."""
         self.focal = options.focal
         if self.focal is not None and not 0 < self.focal < math.inf:
@@ -140,9 +140,10 @@ class NetworkDepth:
     # -- Relative depth --------------------------------------------------------------------------
 
     @property
-    def is_relative(self) -> bool:
-        """Whether the output is inverse depth up to a scale and a shift that nobody has given."""
-        return self.recipe.kind == "relative" and self.recipe.scale is None
+    def relative(self) -> NetworkDepth | None:
+        """Itself, where the output is inverse depth up to a scale and a shift not given."""
+        is_relative = self.recipe.kind == "relative" and self.recipe.scale is None
+        return self if is_relative else None
 
     def pooled(self, references: Iterable[Image]) -> RelativeDepth:
         """One `normalization` for all these images: where a calibration starts."""
@@ -152,8 +153,8 @@ class NetworkDepth:
             maps.append(values[np.isfinite(values)])
         return normalization(np.concatenate(maps))
 
-    def files(self, index: int) -> list[Path]:
-        """See `depth.files_of`: the model, and the recipe beside it."""
+    def files_of(self, index: int) -> list[Path]:
+        """The model, and the recipe beside it."""
         beside = self.path.with_suffix(".yaml")
         return [self.path, beside] if beside.is_file() else [self.path]
 
@@ -264,7 +265,7 @@ class NetworkDepth:
 
     def _depth(self, raw: _Raw, size: Size) -> Depth:
         recipe = self.recipe
-        depth = to_depth(raw.values, recipe, self.relative)
+        depth = to_depth(raw.values, recipe, self.relative_depth)
         seen = math.nan if recipe.focal_output is None else raw.focal
         seen = recipe.canonical_focal or seen
         if self.focal is not None and not math.isnan(seen):
@@ -292,7 +293,7 @@ class NetworkDepth:
 
 
 def to_depth(values: Array, recipe: Recipe, relative: RelativeDepth | None = None) -> Depth:
-    """Depth ``(h, w)`` [m] that a network's own output means; what is no number stays none.
+    """Depth ``(h, w)`` [m] that a network's own output means; what is not a number stays so.
 
     Infinity is farther than any depth. ``relative`` is for kind ``relative`` without a scale; None
     is this map's own `normalization`.

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import Image
+
+if TYPE_CHECKING:
+    from .network import NetworkDepth
 
 Depth = NDArray[np.float32]
 
@@ -18,27 +22,54 @@ def reciprocal(values: Depth) -> Depth:
     return np.divide(1, values, out=np.zeros(values.shape, np.float32), where=values > 0)
 
 
-class DepthProvider(Protocol):
-    """Depth of frame ``index``, whose reference image is given: ``(h, w)`` float32 [m]."""
+class DepthProvider:
+    """Depth of reference images: what sources of depth derive from.
 
-    def __call__(self, index: int, reference: Image) -> Depth: ...
-
-
-def is_parallel(provider: object) -> bool:
-    """Whether several threads may ask a provider at a time: those with a true ``parallel``."""
-    return bool(getattr(provider, "parallel", False))
-
-
-def files_of(provider: object, index: int) -> list[Path]:
-    """Files that the depth of a frame is made from, as far as the provider tells.
-
-    A provider tells by ``files(index)``, by ``paths``, one for each frame, by a ``path``, or by
-    those of the ``provider`` that it goes on from.
+    By default one thread at a time may ask, frames do not depend on each other, depth is in metres
+    and no files are known. A source overrides what differs.
     """
-    if hasattr(provider, "files"):
-        return list(provider.files(index))
-    if hasattr(provider, "provider"):
-        return files_of(provider.provider, index)
-    if hasattr(provider, "paths"):
-        return [provider.paths[index]]
-    return [provider.path] if hasattr(provider, "path") else []
+
+    def __call__(self, index: int, reference: Image) -> Depth:
+        """Depth of frame ``index``, whose reference image is given: ``(h, w)`` float32 [m]."""
+        raise NotImplementedError
+
+    @property
+    def is_parallel(self) -> bool:
+        """Whether several threads may ask at a time."""
+        return False
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the depth of a frame depends on the frames before it."""
+        return False
+
+    @property
+    def relative(self) -> NetworkDepth | None:
+        """The network whose scale and shift have to be estimated; None where depth is in metres."""
+        return None
+
+    def files_of(self, index: int) -> list[Path]:
+        """Files that the depth of a frame is made from, as far as they are known."""
+        return []
+
+
+@dataclass(frozen=True)
+class WrappedDepth(DepthProvider):
+    """Depth made from that of another provider, whose properties it has unless overridden."""
+
+    provider: DepthProvider
+
+    @property
+    def is_parallel(self) -> bool:
+        return self.provider.is_parallel
+
+    @property
+    def is_steady(self) -> bool:
+        return self.provider.is_steady
+
+    @property
+    def relative(self) -> NetworkDepth | None:
+        return self.provider.relative
+
+    def files_of(self, index: int) -> list[Path]:
+        return self.provider.files_of(index)

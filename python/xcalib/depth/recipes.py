@@ -1,4 +1,4 @@
-"""What a depth network expects and returns, where its graph cannot say.
+"""What a depth network expects and returns, which its graph does not contain.
 
 Every shipped recipe names the page its facts come from. What could not be confirmed there is said
 in docs/inputs_networks.md.

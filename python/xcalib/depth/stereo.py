@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..frames import Image, InputError, gray, list_files, pair, read_image, size_of
 from ..yaml_file import load_yaml
-from .provider import Depth
+from .provider import Depth, DepthProvider
 
 BLOCK = 5
 """Side of the matched blocks [px]."""
@@ -106,7 +106,7 @@ def _matched(
         preFilterCap=31,
         mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
     )
-    # The matcher leaves out the columns from which the largest disparity leads out of the image.
+    # The matcher leaves out the columns from which the largest disparity points out of the image.
     margin, beyond = max(0, lowest + span), max(0, -lowest)
     wide = [
         cv2.copyMakeBorder(image, 0, 0, margin, beyond, cv2.BORDER_REPLICATE)
@@ -118,10 +118,10 @@ def _matched(
     return found
 
 
-class StereoDepth:
+class StereoDepth(DepthProvider):
     """Depth from a folder of the partner's images, paired with the references by `frames.pair`."""
 
-    parallel = True
+    is_parallel = True
 
     def __init__(
         self,
@@ -151,3 +151,6 @@ class StereoDepth:
                 " rectified pair"
             )
         return depth
+
+    def files_of(self, index: int) -> list[Path]:
+        return [self.paths[index]]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..depth import Depth
+from ..depth import Depth, DepthProvider
 from ..depth.files import fitting, known
 from ..frames import Image, InputError
 from .bag import is_bag
@@ -20,7 +20,7 @@ def is_depth_topic(spec: str) -> bool:
     return is_bag(Path(spec.rpartition("#")[0] or spec))
 
 
-class TopicDepth:
+class TopicDepth(DepthProvider):
     """Depth maps of a stream as REP 118 has them: 32FC1 in metres, 16UC1 in millimetres.
 
     Parameters
@@ -43,6 +43,5 @@ class TopicDepth:
         metres = image * MILLIMETRE if image.dtype == np.uint16 else image
         return fitting(known(metres.astype(np.float32), where), reference, where)
 
-    def files(self, index: int) -> list[Path]:
-        """See `depth.files_of`."""
+    def files_of(self, index: int) -> list[Path]:
         return [self.stream.file(index)]

@@ -7,7 +7,6 @@ copy compressed frames from one file to another.
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from av import library_versions
 
 from ..frames import Image, InputError, size_of
+from ..whole_file import WholeFile
 
 # Container, codec and the pixels it stores; None: as they are. The quantizer of the lossy ones is
 # fixed, so that a frame's quality does not depend on where a part began.
@@ -79,13 +79,13 @@ class Encoder:
 
     def __init__(self, path: Path, target: Path, first: Image, rate: float) -> None:
         self.path, self.target = path, target
-        self._partial = path.with_name(f"{path.name}.partial")
+        self._file = WholeFile(path)
         self._like = (*first.shape, str(first.dtype))
         self._pixels = _PIXELS[str(first.dtype), first.ndim]
         self._frames = 0
         stored = _KINDS[target.suffix.lower()][2]
         with _named(target):
-            self._container = av.open(_name(self._partial), "w", format="matroska")
+            self._container = av.open(_name(self._file.partial), "w", format="matroska")
             self._stream = _added(self._container, target, rate)
             self._stream.width, self._stream.height = size_of(first)
             self._stream.pix_fmt = stored or _LOSSLESS[self._pixels]
@@ -109,14 +109,14 @@ class Encoder:
         with _named(self.target):
             self._container.mux(self._stream.encode(None))
             self._container.close()
-        _check_count(self._partial, frames, self.target)
-        os.replace(self._partial, self.path)
+        _check_count(self._file.partial, frames, self.target)
+        self._file.keep()
 
     def discard(self) -> None:
         """Leave nothing behind, unless it was closed."""
         with contextlib.suppress(OSError, ValueError, av.FFmpegError):
             self._container.close()
-        self._partial.unlink(missing_ok=True)
+        self._file.discard()
 
 
 def join(
@@ -137,10 +137,10 @@ def join(
     check
         Called for every frame; what it raises ends the writing.
     """
-    partial = parts[0][0].with_name(f"{target.name}.partial")
+    beside_parts = parts[0][0].with_name(f"{target.name}.partial")
     step = 1 / _fraction(rate)
     frames = 0
-    try:
+    with WholeFile(target, beside_parts) as partial:
         with _named(target), av.open(_name(partial), "w", format=_format(target)) as container:
             stream = None
             for path, count in parts:
@@ -164,9 +164,6 @@ def join(
                         container.mux(packet)
                         frames += 1
         _check_count(partial, sum(count for _, count in parts), target)
-        os.replace(partial, target)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _name(path: Path) -> str:

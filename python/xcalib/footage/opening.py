@@ -19,8 +19,7 @@ from ..depth import (
     MeasuredDepth,
     NetworkOptions,
     PlaneDepth,
-    files_of,
-    is_parallel,
+    WrappedDepth,
     open_depth,
 )
 from ..depth.points import POINT_SUFFIXES
@@ -54,23 +53,16 @@ class Matching:
 
 
 @dataclass(frozen=True)
-class PickedDepth:
+class PickedDepth(WrappedDepth):
     """Depth of some frames of a stream."""
 
-    depth: DepthProvider
     indices: list[int]
 
-    @property
-    def parallel(self) -> bool:
-        """See `depth.is_parallel`."""
-        return is_parallel(self.depth)
-
     def __call__(self, index: int, reference: Image) -> Depth:
-        return self.depth(self.indices[index], reference)
+        return self.provider(self.indices[index], reference)
 
-    def files(self, index: int) -> list[Path]:
-        """See `depth.files_of`."""
-        return files_of(self.depth, self.indices[index])
+    def files_of(self, index: int) -> list[Path]:
+        return self.provider.files_of(self.indices[index])
 
 
 @dataclass(frozen=True)

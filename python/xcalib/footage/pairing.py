@@ -7,7 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import FrameList, Pairing, nearest_depths, pair_frames, pair_times
+from .._core import (
+    FrameList,
+    Pairing,
+    _option_words,
+    nearest_depths,
+    pair_frames,
+    pair_times,
+)
 from .._core import match_depths as match_depth_lists
 from .._core import median_period as median_of_steps
 from ..frames import InputError
@@ -24,7 +31,7 @@ __all__ = [
     "pair_times",
 ]
 
-METHODS = ("auto", "name", "order", "time")
+METHODS = _option_words()["pair"]
 
 
 def frame_list(stream: Stream) -> FrameList:

@@ -2,6 +2,7 @@
 // by time.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -64,6 +65,9 @@ struct Pairing {
 // the frames behind the last one chosen. Throws InputError where no two are near.
 Pairing pair_times(const std::vector<double>& references, const std::vector<double>& sources,
                    double offset = 0.0, std::optional<double> max_gap = std::nullopt);
+
+// How frames are paired.
+inline constexpr std::array kPairingMethods = {"auto", "name", "order", "time"};
 
 // `method`: name (pair_files), order (first with first, of equally many), time (pair_times), or
 // auto: by time where both have times, else files by name, and others in order. `offset` [s]:

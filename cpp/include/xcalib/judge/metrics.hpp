@@ -16,7 +16,8 @@ namespace XCALIB_EXPORT xcalib {
 double gc(const Image& reference, const Image& registered, const std::uint8_t* valid);
 
 // Structural similarity (Wang et al. 2004): Gaussian window of sigma 1.5 px (11 x 11), K1 = 0.01,
-// K2 = 0.03, sample covariance as published, `data_range` the span of the values.
+// K2 = 0.03, sample covariance as published, `data_range` the span of the values, > 0. Throws
+// std::invalid_argument.
 double ssim(const Image& reference, const Image& registered, const std::uint8_t* valid,
             double data_range);
 
@@ -27,6 +28,7 @@ double ncc(const Image& reference, const Image& registered, const std::uint8_t* 
 double rmse(const Image& reference, const Image& registered, const std::uint8_t* valid);
 
 // Peak signal-to-noise ratio [dB]: 20 log10(data_range / RMSE); infinite for equal images.
+// Throws std::invalid_argument where `data_range` is not > 0.
 double psnr(const Image& reference, const Image& registered, const std::uint8_t* valid,
             double data_range);
 

@@ -1,4 +1,4 @@
-"""What the command-line options of several modules are made of."""
+"""Building blocks of command-line options."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ``xcalib models`` commands."""
+"""`xcalib models`: depth networks and their cached results."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import sys
 import click
 from tqdm import tqdm
 
-from .cache import ResultCache
-from .depth.recipes import RECIPES
-from .models import fetch, model_folder, read_index, verify
+from ..cache import ResultCache
+from ..depth.recipes import RECIPES
+from ..models import fetch, model_folder, read_index, verify
 
 
 @click.group("models", short_help="Depth networks: recipes, files, cached results.")
-def models() -> None:
+def command() -> None:
     """Depth networks: the recipes that are known, their files, and their cached results.
 
     Files are kept in XCALIB_MODELS or the user's data folder, results in XCALIB_CACHE or the
@@ -21,7 +21,7 @@ def models() -> None:
     """
 
 
-@models.command("list")
+@command.command("list")
 def list_command() -> None:
     """Print the recipes with licences and sources, and the files that were fetched."""
     click.echo("recipes:")
@@ -35,7 +35,7 @@ def list_command() -> None:
         click.echo(f"  {name}  sha256 {entry['sha256']}  {entry['url']}")
 
 
-@models.command("fetch")
+@command.command("fetch")
 @click.argument("url")
 @click.option("--name", metavar="FILE", help="Name for the file.  [default: the address' own]")
 def fetch_command(url: str, name: str | None) -> None:
@@ -53,7 +53,7 @@ def fetch_command(url: str, name: str | None) -> None:
     click.echo(path)
 
 
-@models.command("verify")
+@command.command("verify")
 def verify_command() -> None:
     """Hash the fetched files again and compare; exit code 1 if one has changed or is missing."""
     states = verify()
@@ -65,7 +65,7 @@ def verify_command() -> None:
         sys.exit(1)
 
 
-@models.command("cache")
+@command.command("cache")
 @click.option("--clear", is_flag=True, help="Remove the results.")
 def cache_command(clear: bool) -> None:
     """Print how much the cached results of depth networks take, and where they are."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from ..cli_options import file
-from .pairing import METHODS
+from ..footage import METHODS
+from .options import file
 
 
 def clock_offset(ctx: click.Context, param: click.Parameter, value: str) -> float | None:

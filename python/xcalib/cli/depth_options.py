@@ -1,4 +1,4 @@
-"""The command-line options about depth; those of `MeasuredDepth` bear the names of its fields."""
+"""The command-line options about depth; those of `MeasuredDepth` have the names of its fields."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import Any
 
 import click
 
-from .._core import PlaneDepth
-from ..cli_options import file, number
-from .files import PNG_SCALE
-from .measured import MeasuredDepth
+from ..depth import PNG_SCALE, MeasuredDepth, PlaneDepth
+from .options import file, number
 
 PLANE = PlaneDepth()
 

@@ -1,0 +1,185 @@
+// Cameras and rigs, and rig files.
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <sstream>
+
+#include "bindings.hpp"
+#include "xcalib/rig_file.hpp"
+
+namespace xcalib {
+namespace {
+
+namespace py = pybind11;
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+template <class Matrix>
+Matrix numbers_of(const char* name, const py::object& object, const char* expected) {
+    try {
+        return object.cast<Matrix>();
+    } catch (const py::cast_error&) {
+        throw py::value_error(std::string(name) + " is " + std::string(py::repr(object)) +
+                              ", expected " + expected);
+    }
+}
+
+Rig make_rig(const Pinhole& reference, const Pinhole& source, const py::object& R,
+             const py::object& t) {
+    Rig rig;
+    rig.reference = reference;
+    rig.source = source;
+    if (!R.is_none())
+        rig.source_from_reference.rotation =
+            rotation_of(numbers_of<Eigen::Matrix3d>("R", R, "a (3, 3) array of numbers"));
+    if (!t.is_none())
+        rig.source_from_reference.translation =
+            numbers_of<Eigen::Vector3d>("t", t, "a (3,) array of numbers");
+    rig.validate();
+    return rig;
+}
+
+std::string text_of(const Pinhole& c) {
+    std::ostringstream out;
+    out << "Pinhole(width=" << c.width << ", height=" << c.height << ", fx=" << c.fx
+        << ", fy=" << c.fy << ", cx=" << c.cx << ", cy=" << c.cy << ", skew=" << c.skew << ")";
+    return out.str();
+}
+
+void bind_pinhole(py::module_& m) {
+    py::class_<Pinhole>(m, "Pinhole", R"(A pinhole camera, Eq. (intrinsic) of the paper.
+
+Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.)")
+        .def(py::init([](int width, int height, double fx, double fy, double cx, double cy,
+                         double skew) {
+                 const Pinhole camera{width, height, fx, fy, cx, cy, skew};
+                 camera.validate("Pinhole");
+                 return camera;
+             }),
+             py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
+             py::arg("cy"), py::arg("skew") = 0.0,
+             "Raises ValueError where a size is below 1, a focal length not > 0, or a value not "
+             "finite.")
+        .def_static(
+            "from_hfov",
+            [](int width, int height, double hfov_deg) {
+                return Pinhole::from_hfov(width, height, hfov_deg * kDegree);
+            },
+            py::arg("width"), py::arg("height"), py::arg("hfov_deg"),
+            "Square pixels and the principal point at the centre; hfov_deg in (0, 180).")
+        .def_readwrite("width", &Pinhole::width, "[px]")
+        .def_readwrite("height", &Pinhole::height, "[px]")
+        .def_readwrite("fx", &Pinhole::fx, "[px]")
+        .def_readwrite("fy", &Pinhole::fy, "[px]")
+        .def_readwrite("cx", &Pinhole::cx, "[px]")
+        .def_readwrite("cy", &Pinhole::cy, "[px]")
+        .def_readwrite("skew", &Pinhole::skew, "[px]")
+        .def_property_readonly("K", &Pinhole::K, "(3, 3) float64 intrinsic matrix [px].")
+        .def_property_readonly(
+            "hfov_deg", [](const Pinhole& c) { return c.hfov() / kDegree; },
+            "Horizontal field of view, 2 atan(width / (2 fx)) [deg].")
+        .def_property_readonly(
+            "vfov_deg", [](const Pinhole& c) { return c.vfov() / kDegree; },
+            "Vertical field of view [deg].")
+        .def("resized", &Pinhole::resized, py::arg("width"), py::arg("height"),
+             "The same camera behind an image of another size [px].")
+        .def("__repr__", &text_of);
+}
+
+void bind_relative_depth(py::module_& m) {
+    py::class_<RelativeDepth>(m, "RelativeDepth",
+                              R"(Relative inverse depth r in metres: D = 1 / (scale r + shift).
+
+A rig that was calibrated with it has its translation in the unit that the scale stands for.)")
+        .def(py::init([](double scale, double shift) {
+                 const RelativeDepth relative{scale, shift};
+                 relative.validate("RelativeDepth");
+                 return relative;
+             }),
+             py::arg("scale"), py::arg("shift"),
+             "Raises ValueError where the scale is not > 0, or a value not finite.")
+        .def_readonly("scale", &RelativeDepth::scale, "> 0")
+        .def_readonly("shift", &RelativeDepth::shift, "[1/m], if the scale is of metres.")
+        .def("__repr__", [](const RelativeDepth& r) {
+            std::ostringstream out;
+            out << "RelativeDepth(scale=" << r.scale << ", shift=" << r.shift << ")";
+            return out.str();
+        });
+}
+
+void bind_rig_pose(py::class_<Rig>& rig) {
+    rig.def_property(
+           "R", &Rig::R,
+           [](Rig& rig, const Eigen::Matrix3d& R) {
+               rig = make_rig(rig.reference, rig.source, py::cast(R), py::cast(rig.t()));
+           },
+           "(3, 3) float64 rotation, source_from_reference.")
+        .def_property(
+            "t", [](const Rig& rig) { return rig.t(); },
+            [](Rig& rig, const Eigen::Vector3d& t) {
+                rig = make_rig(rig.reference, rig.source, py::cast(rig.R()), py::cast(t));
+            },
+            "(3,) float64 translation, source_from_reference [m].")
+        .def_property_readonly(
+            "quaternion_wxyz",
+            [](const Rig& rig) {
+                const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
+                return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
+            },
+            "(4,) float64 unit quaternion of R.")
+        .def_property_readonly("infinite_homography", &infinite_homography,
+                               "(3, 3) float64, K_S R K_R^-1: where points at infinity go.");
+}
+
+void bind_rig_files(py::class_<Rig>& rig) {
+    rig.def(
+           "save",
+           [](const Rig& rig, const std::filesystem::path& path) { save_rig(rig, path.string()); },
+           py::arg("path"), "Writes the rig file, whole or not at all. OSError names the path.")
+        .def_static(
+            "load", [](const std::filesystem::path& path) { return load_rig(path.string()); },
+            py::arg("path"),
+            "Reads a rig file. OSError where it cannot be read; ValueError, with the path, the "
+            "field "
+            "and what was expected, where it is not a rig.");
+}
+
+void bind_rig(py::module_& m) {
+    py::class_<Rig> rig(m, "Rig", R"(A reference and a source camera, fixed to each other.
+
+`R` and `t` take points of the reference camera to the source camera: X_S = R X_R + t.)");
+    rig.def(py::init(&make_rig), py::arg("reference"), py::arg("source"), py::arg("R") = py::none(),
+            py::arg("t") = py::none(),
+            "R: (3, 3) rotation, default identity. t: (3,) [m], default zero. ValueError "
+            "otherwise.")
+        .def_readwrite("reference", &Rig::reference, "Pinhole that gives the pixel grid.")
+        .def_readwrite("source", &Rig::source, "Pinhole whose images are registered.")
+        .def_readwrite("relative_depth", &Rig::relative_depth,
+                       "RelativeDepth it was calibrated with, or None: metric depth.");
+    bind_rig_pose(rig);
+    bind_rig_files(rig);
+    rig.def("resized", &Rig::resized, py::arg("reference_width"), py::arg("reference_height"),
+            py::arg("source_width"), py::arg("source_height"),
+            "The same rig behind images of other sizes [px].")
+        .def("fitted", &fitted, py::arg("reference_width"), py::arg("reference_height"),
+             py::arg("source_width"), py::arg("source_height"),
+             "The rig for images of these sizes [px]: itself, or resized where both have its "
+             "aspects, to within a pixel. Raises InputError where one has not.")
+        .def("__repr__", [](const Rig& rig) {
+            std::ostringstream out;
+            out << "Rig(reference=" << text_of(rig.reference) << ", source=" << text_of(rig.source)
+                << ", t=[" << rig.t().transpose() << "])";
+            return out.str();
+        });
+}
+
+}  // namespace
+
+void bind_camera(py::module_& m) {
+    bind_pinhole(m);
+    bind_relative_depth(m);
+    bind_rig(m);
+}
+
+}  // namespace xcalib

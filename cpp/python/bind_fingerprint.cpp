@@ -1,0 +1,28 @@
+#include <pybind11/stl/filesystem.h>
+
+#include "bindings.hpp"
+#include "xcalib/footage/fingerprint.hpp"
+
+namespace xcalib {
+namespace {
+
+namespace py = pybind11;
+
+}  // namespace
+
+void bind_fingerprint(py::module_& m) {
+    m.def(
+        "fingerprint", [](const std::string& data) { return fingerprint(data); }, py::arg("data"),
+        "16 hexadecimal digits of a text, or of bytes: it tells changes by accident, not by "
+        "intent.");
+    m.def(
+        "rig_fingerprint", [](const Rig& rig) { return fingerprint(rig); }, py::arg("rig"),
+        "The fingerprint() of all numbers of a rig.");
+    m.def("absolute_path", &absolute_path, py::arg("path"),
+          "A path from the root, without `.` and empty parts; `..` and links stay.");
+    m.def("file_stamp", &file_stamp, py::arg("path"),
+          "Where a file is, its size, and the time of its last change; of a folder, those of all "
+          "files in it. A path that cannot be read is itself.");
+}
+
+}  // namespace xcalib

@@ -1,0 +1,156 @@
+#include "xcalib/judge/documents.hpp"
+
+#include "judge/json.hpp"
+#include "xcalib/judge/describe.hpp"
+
+namespace xcalib {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+Json json_of(const CandidateReport& c) {
+    return {{"score", c.score},
+            {"correlation", c.correlation},
+            {"overlap", c.overlap},
+            {"refined_nec", c.refined_nec},
+            {"reference_hfov_deg", c.refined.reference.hfov() / kDegree},
+            {"source_hfov_deg", c.refined.source.hfov() / kDegree}};
+}
+
+Json json_of(const LevelReport& l) {
+    return {{"factor", l.factor},
+            {"stage", l.stage},
+            {"width", l.width},
+            {"height", l.height},
+            {"iterations", l.iterations},
+            {"initial_cost", l.initial_cost},
+            {"final_cost", l.final_cost},
+            {"nec", l.nec},
+            {"aligned", l.aligned},
+            {"valid_share", l.valid_share},
+            {"condition_number", l.condition_number},
+            {"seconds", l.seconds},
+            {"stopped", l.stopped}};
+}
+
+Json json_of(const AdamStep& s) {
+    return {{"learning_rate", s.learning_rate},
+            {"image", s.image},
+            {"flow", s.flow},
+            {"prior", s.prior},
+            {"total", s.total}};
+}
+
+Json json_of(const CalibrationTimes& t) {
+    return {{"prepare", t.prepare}, {"search", t.search},     {"warp", t.warp},
+            {"value", t.value},     {"jacobian", t.jacobian}, {"solver", t.solver}};
+}
+
+Json json_of(const Pinhole& camera) {
+    return {{"width", camera.width},
+            {"height", camera.height},
+            {"fx", camera.fx},
+            {"fy", camera.fy},
+            {"cx", camera.cx},
+            {"cy", camera.cy},
+            {"skew", camera.skew},
+            {"hfov_deg", camera.hfov() / kDegree},
+            {"vfov_deg", camera.vfov() / kDegree}};
+}
+
+template <class Value>
+Json list_of(const std::vector<Value>& values) {
+    Json list = Json::array();
+    for (const Value& value : values) list.push_back(json_of(value));
+    return list;
+}
+
+template <class Vector>
+Json numbers_of(const Vector& values) {
+    Json list = Json::array();
+    for (const double value : values) list.push_back(value);
+    return list;
+}
+
+std::string text_of(const Json& document) {
+    return document.dump(2, ' ', true, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+Json json_of(const CalibrationReport& report) {
+    return {{"converged", report.converged},
+            {"message", report.message},
+            {"seconds", report.seconds},
+            {"time", json_of(report.time)},
+            {"working_width", report.working_width},
+            {"working_height", report.working_height},
+            {"nec", report.nec},
+            {"baseline_nec", report.baseline_nec},
+            {"contrast", report.contrast},
+            {"repeatability_px", report.repeatability_px},
+            {"visible_shift_px", report.visible_shift_px},
+            {"valid_share", report.valid_share},
+            {"frames", report.frames},
+            {"candidates", list_of(report.candidates)},
+            {"levels", list_of(report.levels)},
+            {"steps", list_of(report.steps)}};
+}
+
+Json json_of(const Scores& scores) {
+    Json out = Json::object();
+    for (std::size_t i = 0; i < scores.size(); ++i) out[kScoreNames[i]] = scores[i];
+    return out;
+}
+
+Json json_of(const Evaluation& evaluation) {
+    Scores gains;
+    for (std::size_t i = 0; i < gains.size(); ++i) gains[i] = evaluation.gain(i);
+    Json frames = Json::array();
+    for (const auto& [registered, unregistered] : evaluation.frames)
+        frames.push_back(
+            {{"registered", json_of(registered)}, {"unregistered", json_of(unregistered)}});
+    return {{"size", Json::array({evaluation.width, evaluation.height})},
+            {"valid_share", evaluation.valid_share},
+            {"registered", json_of(evaluation.registered)},
+            {"unregistered", json_of(evaluation.unregistered)},
+            {"gain_percent", json_of(gains)},
+            {"frames", frames}};
+}
+
+Json json_of(const Rig& rig) {
+    const RigFacts facts = describe(rig);
+    Json centre = Json::array();
+    for (const RigFacts::Centre& row : facts.centre)
+        centre.push_back({{"depth_m", row.depth ? Json(*row.depth) : Json(nullptr)},
+                          {"point_px", numbers_of(row.point)},
+                          {"parallax_px", row.parallax}});
+    const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
+    return {{"reference", json_of(rig.reference)},
+            {"source", json_of(rig.source)},
+            {"rotation_deg",
+             {{"pan", facts.pan_deg}, {"tilt", facts.tilt_deg}, {"roll", facts.roll_deg}}},
+            {"quaternion_wxyz", Json::array({q.w(), q.x(), q.y(), q.z()})},
+            {"translation_m", numbers_of(rig.t())},
+            {"position_m", numbers_of(facts.position)},
+            {"baseline_m", facts.baseline},
+            {"centre", centre}};
+}
+
+std::string report_document(const CalibrationReport& report, const std::string& rig_file,
+                            const std::vector<std::string>& files) {
+    Json document{{"format", "xcalib-report"}, {"version", 1}, {"rig", rig_file}, {"files", files}};
+    document.update(json_of(report));
+    return text_of(document) + "\n";
+}
+
+std::string evaluation_document(const Evaluation& evaluation, const std::string& rig_file,
+                                const std::vector<std::string>& files) {
+    Json document{{"rig", rig_file}, {"files", files}};
+    document.update(json_of(evaluation));
+    return text_of(document) + "\n";
+}
+
+std::string rig_document(const Rig& rig) { return text_of(json_of(rig)); }
+
+}  // namespace xcalib

@@ -1,0 +1,36 @@
+// What a calibration does, decided once at its start.
+#pragma once
+
+#include "xcalib/calibration_options.hpp"
+#include "xcalib/flow.hpp"
+
+namespace xcalib {
+
+// Parts of the method, for a study of what each is worth (bench/experiments): all belong on.
+struct Parts {
+    bool images = true;         // the image loss; off, the flow term and the prior move the rig
+    bool pyramid = true;        // off: what the search has found and placed is solved at full size
+    bool stages = true;         // off: everything is free, without a prior, from the first level on
+    bool floor = true;          // of the objective's edges; off: they count however weak
+    bool pair_weights = true;   // c_i; off: every pair counts alike
+    bool normalization = true;  // photometric; off: gray values as given
+    bool depth_edges = true;    // are left out of the NEC at the finer levels; off: not
+};
+
+struct Plan {
+    // Throws std::invalid_argument where the options are not valid.
+    explicit Plan(const CalibrationOptions& options, const FlowEstimator& estimator = nullptr,
+                  const Parts& parts = {});
+
+    CalibrationOptions options;
+    FlowEstimator estimator;  // of the caller; none: the built-in patch flow
+    Parts parts;
+
+    bool searches;   // for the start; else it is given
+    bool uses_flow;  // the flow term, when everything is free and wherever nothing was searched
+    // All frames are solved from the coarsest level on, since flow reaches further the coarser the
+    // level is; else from the level at which the start was found.
+    bool from_coarsest;
+};
+
+}  // namespace xcalib

@@ -1,0 +1,47 @@
+"""The ``xcalib`` command: one module a command, imported when it is asked for.
+
+Results go to stdout, progress and errors to stderr. Exit codes: 0 done and trusted, 1 failed,
+2 wrong usage or input, 3 done, but the result is not to be trusted.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import click
+
+from .errors import ErrorsInOneLine
+
+COMMANDS = ("calibrate", "demo", "evaluate", "inspect", "models", "register", "report")
+
+
+class Commands(ErrorsInOneLine):
+    """The commands by the names of their modules."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f"{__name__}.{name}").command
+        return command
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="xcalib-rgbt", prog_name="xcalib")
+def cli() -> None:
+    """Calibrate a fixed pair of cameras, visible and thermal, and register their frames.
+
+    REFERENCE and SOURCE are folders or patterns of images (8 or 16 bit, any size), videos, or
+    bags with a topic (drive.mcap#/camera/image_raw); #left, #right, #top or #bottom behind one
+    takes half of each frame.
+
+    Exit codes: 0 done and trusted, 1 failed, 2 wrong usage or input, 3 done, but the result is
+    not to be trusted.
+    """
+
+
+def main() -> None:
+    """Entry point of the ``xcalib`` command."""
+    cli(prog_name="xcalib")

@@ -1,0 +1,5 @@
+"""The command as ``python -m xcalib.cli``."""
+
+from . import main
+
+main()

@@ -1,0 +1,87 @@
+"""Arguments that several commands share, and what they open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .._core import CalibrationOptions, Rig
+from ..depth import MeasuredDepth, NetworkOptions, PlaneDepth
+from ..footage import Matching
+from ..inputs import Inputs
+from ..pipeline import Frames
+from .depth_options import DEPTH_OPTIONS
+from .footage_options import FOOTAGE_OPTIONS
+from .options import options
+
+DEFAULTS = CalibrationOptions()
+SEED = click.IntRange(0, 2**32 - 1)
+
+frames_arguments = options(
+    click.argument("reference", type=click.Path(path_type=Path)),
+    click.argument("source", type=click.Path(path_type=Path)),
+    *DEPTH_OPTIONS,
+    *FOOTAGE_OPTIONS,
+)
+
+quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
+threads_option = click.option(
+    "--threads",
+    type=click.IntRange(min=0),
+    default=DEFAULTS.num_threads,
+    show_default=True,
+    help="Threads to use; 0 means all cores.",
+)
+colormap_option = click.option(
+    "--source-colormap",
+    metavar="MAP",
+    default="auto",
+    show_default=True,
+    help="False-colour source images: turn them back to numbers if they are (auto), never (none),"
+    " or by a map of that name (inferno, jet, iron, ...).",
+)
+rig_argument = click.argument("rig_file", metavar="RIG", type=click.Path(path_type=Path))
+
+
+def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
+    """The values of `frames_arguments`, by the names of the command's parameters."""
+    a = arguments
+    return Inputs(
+        a["reference"],
+        a["source"],
+        a["depth_spec"],
+        a["depth_scale"],
+        Matching(
+            a["pairing"], a["time_offset"], a["max_gap"], a["reference_times"], a["source_times"]
+        ),
+        PlaneDepth(a["camera_height"], a["horizon"], a["far"], a["plane_hfov"], a["plane_roll"]),
+        NetworkOptions(
+            a["depth_recipe"],
+            a["depth_focal"],
+            a["inverse_scale"],
+            a["inverse_shift"],
+            a["providers"],
+            threads,
+        ),
+        MeasuredDepth(**{field.name: a[field.name] for field in fields(MeasuredDepth)}),
+    )
+
+
+def open_frames(arguments: Mapping[str, Any], threads: int, rig: Rig | None) -> Frames:
+    """Open what `frames_arguments` names, and print how frames were paired by time."""
+    frames = Frames.open(inputs_of(arguments, threads), rig)
+    for note in frames.notes:
+        click.echo(note, err=True)
+    return frames
+
+
+def with_scalar_sources(frames: Frames, colormap: str) -> Frames:
+    """The frames with false colour turned back to numbers, with a line on stderr."""
+    frames, line = frames.with_scalar_sources(colormap)
+    if line:
+        click.echo(line, err=True)
+    return frames

@@ -1,0 +1,272 @@
+"""`xcalib calibrate`: from frames to a rig file."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .._core import CalibrationOptions, Pinhole, Rig
+from ..flow import FlowProvider, NetworkFlow
+from ..frames import Image, InputError, check_file_writable, size_of
+from ..pipeline import choose_by_content, left_out, run_calibration, save_rig, with_fitted_plane
+from .arguments import (
+    DEFAULTS,
+    SEED,
+    colormap_option,
+    frames_arguments,
+    open_frames,
+    quiet_option,
+    threads_option,
+    with_scalar_sources,
+)
+from .documents import write_json
+from .errors import NOT_TRUSTED, stop, warn
+
+
+def intrinsics(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[float, float, float, float] | None:
+    """Parse ``FX,FY,CX,CY`` in pixels."""
+    if value is None:
+        return None
+    try:
+        fx, fy, cx, cy = (float(part) for part in value.split(","))
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is not four numbers FX,FY,CX,CY") from None
+    if not (fx > 0 and fy > 0 and all(map(math.isfinite, (fx, fy, cx, cy)))):
+        raise click.BadParameter(f"{value!r}: expected finite numbers, FX and FY above 0 px")
+    return fx, fy, cx, cy
+
+
+def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
+    """What ``--flow`` says: the mode of the options, and the provider, None for the built-in."""
+    if spec in ("auto", "off"):
+        return spec, None
+    if spec == "patch":
+        return "on", None
+    if not spec.endswith(".onnx"):
+        raise click.UsageError(f"--flow is {spec!r}, expected auto, off, patch or a .onnx file")
+    return "on", NetworkFlow(spec)
+
+
+@click.command("calibrate")
+@frames_arguments
+@click.option(
+    "-o",
+    "--output",
+    metavar="RIG",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Rig file to write (YAML).",
+)
+@click.option(
+    "--frames",
+    "max_frames",
+    metavar="N",
+    type=click.IntRange(min=1),
+    default=DEFAULTS.max_frames,
+    show_default=True,
+    help="Frames to use at most.",
+)
+@click.option(
+    "--seed",
+    metavar="N",
+    type=SEED,
+    default=DEFAULTS.seed,
+    show_default=True,
+    help="Seed of the frame choice.",
+)
+@click.option(
+    "--choose",
+    type=click.Choice(["informed", "spread"]),
+    default="informed",
+    show_default=True,
+    help="Frames that determine the rig best (looks at 4 N), or spread over the footage.",
+)
+@click.option(
+    "--explain", is_flag=True, help="Print why each frame was taken or left (--choose informed)."
+)
+@colormap_option
+@threads_option
+@click.option(
+    "--initial",
+    metavar="RIG",
+    type=click.Path(path_type=Path),
+    help="Rig file to start from.  [default: none, searched]",
+)
+@click.option(
+    "--search",
+    type=click.Choice(["auto", "full", "local", "off"]),
+    default=DEFAULTS.search.mode,
+    show_default=True,
+    help="Global search before refinement: full, local (around the initial rig), off, or auto.",
+)
+@click.option(
+    "--flow",
+    "flow_spec",
+    metavar="auto|off|patch|MODEL.onnx",
+    default="auto",
+    show_default=True,
+    help="The flow term: patch, built in, or a network of two images; auto is patch where nothing"
+    " is searched.",
+)
+@click.option(
+    "--solver",
+    type=click.Choice(["ceres", "adam"]),
+    default=DEFAULTS.solver,
+    show_default=True,
+    help="adam is the paper's, which searches nothing.",
+)
+@click.option(
+    "--reference-intrinsics",
+    metavar="FX,FY,CX,CY",
+    callback=intrinsics,
+    help="Known intrinsics of the reference camera, kept [px].  [default: none]",
+)
+@click.option(
+    "--source-intrinsics",
+    metavar="FX,FY,CX,CY",
+    callback=intrinsics,
+    help="Known intrinsics of the source camera, kept [px].  [default: none, estimated]",
+)
+@click.option(
+    "--reference-hfov",
+    metavar="DEG",
+    type=click.FloatRange(0, 180, min_open=True, max_open=True),
+    default=DEFAULTS.reference_hfov_deg,
+    show_default="searched" if DEFAULTS.reference_hfov_deg is None else True,
+    help="Horizontal field of view of the reference camera at the start [deg].",
+)
+@click.option(
+    "--optimize-reference",
+    is_flag=True,
+    default=DEFAULTS.optimize_reference,
+    help="Estimate the reference intrinsics too.  [default: kept]",
+)
+@click.option(
+    "--working-width",
+    metavar="PX",
+    type=click.IntRange(min=1),
+    default=DEFAULTS.working_width,
+    show_default=True,
+    help="Reference width that calibration works at [px].",
+)
+@click.option(
+    "--refine-plane",
+    is_flag=True,
+    help="With --depth plane: find the horizon and the roll from the footage (some 17 quick fits),"
+    " and print them for `register`.",
+)
+@click.option(
+    "--report",
+    "report_file",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Also write the full report (JSON), for `xcalib report`.",
+)
+@quiet_option
+def command(
+    output: Path,
+    max_frames: int,
+    seed: int,
+    choose: str,
+    explain: bool,
+    source_colormap: str,
+    threads: int,
+    initial: Path | None,
+    search: str,
+    flow_spec: str,
+    solver: str,
+    reference_intrinsics: tuple[float, float, float, float] | None,
+    source_intrinsics: tuple[float, float, float, float] | None,
+    reference_hfov: float | None,
+    optimize_reference: bool,
+    working_width: int,
+    refine_plane: bool,
+    report_file: Path | None,
+    quiet: bool,
+    **inputs: Any,
+) -> None:
+    """Estimate both cameras and their pose, and write a rig file.
+
+    The rig is written even if it is not to be trusted (exit code 3).
+    """
+    if reference_intrinsics and (reference_hfov or optimize_reference):
+        raise click.UsageError(
+            "--reference-intrinsics are kept; expected no --reference-hfov or"
+            " --optimize-reference with them"
+        )
+    if explain and choose != "informed":
+        raise click.UsageError("--explain tells of --choose informed, expected that too")
+    if refine_plane and inputs["depth_spec"] != "plane":
+        raise click.UsageError(
+            f"--refine-plane goes with --depth plane, not {inputs['depth_spec']}"
+        )
+    for flag in ("--complete", "--depth-steady"):
+        if refine_plane and inputs[flag[2:].replace("-", "_")]:
+            raise click.UsageError(
+                f"--refine-plane fits the plane itself, which {flag} would change; expected only"
+                " one of them"
+            )
+    calibration = CalibrationOptions(
+        max_frames=max_frames,
+        seed=seed,
+        num_threads=threads,
+        working_width=working_width,
+        reference_hfov_deg=reference_hfov,
+        optimize_reference=optimize_reference,
+    )
+    calibration.search.mode = search
+    calibration.solver = solver
+    calibration.validate()
+    calibration.flow, flow = flow_of(flow_spec)
+
+    def set_cameras(calibration: CalibrationOptions, reference: Image, source: Image) -> None:
+        if reference_intrinsics:
+            calibration.reference_camera = Pinhole(*size_of(reference), *reference_intrinsics)
+        if source_intrinsics:
+            calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
+
+    initial_rig = Rig.load(initial) if initial else None
+    frames = open_frames(inputs, threads, initial_rig)
+    check_file_writable(output)
+    if report_file:
+        check_file_writable(report_file)
+    frames = with_scalar_sources(frames, source_colormap)
+
+    indices = None
+    if choose == "informed":
+        choice = choose_by_content(frames, max_frames, seed, quiet)
+        if explain:
+            click.echo(choice.table(lambda index: frames.references.name(index)))
+        if choice.unusable:
+            first = choice.unusable[0]
+            # What cannot be decoded names its file.
+            named = f"{frames.references.where(first.index)}: " if first.decoded else ""
+            why = named + first.reason
+            if not choice.indices:
+                raise InputError(f"none of {len(choice.candidates)} frames can be used; {why}")
+            warn(left_out(len(choice.unusable), why))
+        indices = choice.indices
+    result, chosen = run_calibration(
+        frames, calibration, initial_rig, quiet, set_cameras, indices, warn, flow
+    )
+    if refine_plane:
+        frames, plane = with_fitted_plane(frames, result.rig, chosen, calibration, quiet)
+        result, chosen = run_calibration(
+            frames, calibration, result.rig, quiet, set_cameras, chosen, warn
+        )
+        click.echo(f"plane: --horizon {plane.horizon:g} --plane-roll {plane.roll_deg:g}")
+    save_rig(result.rig, output)
+    click.echo(result.report.brief())
+    click.echo(f"rig: {output}")
+    if report_file:
+        files = [frames.references.where(index) for index in chosen]
+        document = {"format": "xcalib-report", "version": 1, "rig": str(output), "files": files}
+        write_json(report_file, document | result.report.to_dict())
+        click.echo(f"report: {report_file}")
+    if not result.converged:
+        stop(NOT_TRUSTED, result.report.message)

@@ -1,0 +1,79 @@
+"""`xcalib evaluate`: scores of registered images."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .._core import Rig
+from ..evaluate import as_document, evaluate
+from ..frames import check_file_writable
+from ..pipeline import progress
+from .arguments import (
+    colormap_option,
+    frames_arguments,
+    open_frames,
+    quiet_option,
+    rig_argument,
+    threads_option,
+    with_scalar_sources,
+)
+from .documents import write_json
+from .errors import NOT_TRUSTED, stop
+
+
+@click.command("evaluate", short_help="Score registered SOURCE images against REFERENCE.")
+@rig_argument
+@frames_arguments
+@click.option(
+    "--width",
+    metavar="PX",
+    type=click.IntRange(min=1),
+    default=640,
+    show_default=True,
+    help="Judge at the reference size divided by the least integer that makes it this wide [px].",
+)
+@click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Also write all scores, frame by frame (JSON).",
+)
+@colormap_option
+@threads_option
+@quiet_option
+def command(
+    rig_file: Path,
+    width: int,
+    json_file: Path | None,
+    source_colormap: str,
+    threads: int,
+    quiet: bool,
+    **inputs: Any,
+) -> None:
+    """Score the registered SOURCE against REFERENCE, beside the source that is only resized."""
+    rig = Rig.load(rig_file)
+    frames = open_frames(inputs, threads, rig)
+    if json_file:
+        check_file_writable(json_file)
+    frames = with_scalar_sources(frames, source_colormap)
+    # Depth wants the reference image too: tee hands it on, so that it is read once.
+    references, for_depth = itertools.tee(frames.references)
+    result = evaluate(
+        rig,
+        progress(references, len(frames), "evaluating", quiet),
+        frames.sources,
+        (frames.depth(index, image) for index, image in enumerate(for_depth)),
+        width,
+        threads,
+    )
+    click.echo(result.table())
+    if json_file:
+        names = [frames.references.where(index) for index in range(len(frames))]
+        write_json(json_file, {"rig": str(rig_file), "files": names} | as_document(result))
+    if not result.valid_share:
+        stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")

@@ -1,0 +1,27 @@
+"""`xcalib inspect`: what a rig file or a bag contains."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from .._core import Rig
+from ..footage import camera_infos, is_bag
+from ..inspection import describe, facts_text
+from .arguments import rig_argument
+from .documents import finite
+
+
+@click.command("inspect")
+@rig_argument
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def command(rig_file: Path, as_json: bool) -> None:
+    """Print the facts of a rig file, in units one can picture; of a bag, its cameras."""
+    if is_bag(rig_file):
+        for info in camera_infos(rig_file):
+            click.echo(info.line())
+        return
+    rig = Rig.load(rig_file)
+    click.echo(json.dumps(finite(describe(rig)), indent=2) if as_json else facts_text(rig))

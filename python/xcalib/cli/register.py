@@ -1,0 +1,79 @@
+"""`xcalib register`: source images on the reference pixels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .._core import Rig
+from ..footage import is_video
+from ..frames import InputError, check_file_writable, check_folder_writable
+from ..registration import RegistrationOptions, run_registration
+from .arguments import frames_arguments, open_frames, quiet_option, rig_argument, threads_option
+from .errors import NOT_TRUSTED, stop
+
+
+@click.command("register", short_help="Bring SOURCE images onto the REFERENCE pixels.")
+@rig_argument
+@frames_arguments
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Folder to write to: images under the reference's names, and masks/. Or a video: .mp4,"
+    " .avi (8 bit), .mkv (without loss, gray also 16 bit), and its masks.",
+)
+@click.option("--overlay", "overlays", is_flag=True, help="Also write red-cyan overlays/.")
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Start over.  [default: resume an interrupted run of the same command]",
+)
+@click.option(
+    "--nearest",
+    is_flag=True,
+    help="Take the nearest source pixel as it is: radiometric counts are never mixed."
+    "  [default: bilinear]",
+)
+@click.option(
+    "--occlusion",
+    type=click.Choice(["ignore", "mark", "hide"]),
+    default="mark",
+    show_default=True,
+    help="Pixels hidden from the source by something nearer: not marked, marked in the mask, or"
+    " black as well.",
+)
+@threads_option
+@quiet_option
+def command(
+    rig_file: Path,
+    output: Path,
+    overlays: bool,
+    overwrite: bool,
+    nearest: bool,
+    occlusion: str,
+    threads: int,
+    quiet: bool,
+    **inputs: Any,
+) -> None:
+    """Bring every SOURCE image onto the pixels of its REFERENCE image.
+
+    Images keep the source's type. Masks: 0 valid, 1 outside the source, 2 occluded, 3 no depth.
+
+    Interrupted, the same command resumes: what is whole is not made again.
+    """
+    rig = Rig.load(rig_file)
+    frames = open_frames(inputs, threads, rig)
+    for name in ("reference", "source", "depth_spec"):
+        if Path(inputs[name]).resolve() == output.resolve():
+            raise InputError(f"output folder {output} is an input folder, expected another")
+    (check_file_writable if is_video(output) else check_folder_writable)(output)
+    how = RegistrationOptions(threads, overlays, nearest, occlusion, overwrite)
+    total = run_registration(frames, rig, output, how, inputs, quiet)
+    click.echo(f"{total.summary()}: {output}")
+    if not total.valid:
+        stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")

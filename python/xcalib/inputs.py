@@ -1,0 +1,30 @@
+"""What the commands' arguments on footage and its depth say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .depth import PNG_SCALE, MeasuredDepth, NetworkOptions, PlaneDepth
+from .footage import Matching
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Footage of two cameras and the depth of the reference camera's, named but not opened."""
+
+    reference: str | Path
+    source: str | Path
+    """Folders or patterns of images, videos, bags; see `footage.open_stream`."""
+    depth: str | Path
+    """A ``--depth`` argument, see `depth.open_depth`."""
+    depth_scale: float = PNG_SCALE
+    """Metres per count of 16-bit PNG depth."""
+    matching: Matching = field(default_factory=Matching)
+    """Which frames of the two belong together."""
+    plane: PlaneDepth = field(default_factory=PlaneDepth)
+    """The road, where depth is ``plane``."""
+    network: NetworkOptions = field(default_factory=NetworkOptions)
+    """How to run it, where depth is a network."""
+    measured: MeasuredDepth = field(default_factory=MeasuredDepth)
+    """Lidar and stereo; completion and averaging over time of any depth."""

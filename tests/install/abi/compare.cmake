@@ -1,0 +1,12 @@
+# Both programs print the same, and more than a few lines.
+execute_process(COMMAND ${PLAIN} OUTPUT_VARIABLE plain COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${AVX2} OUTPUT_VARIABLE avx2 COMMAND_ERROR_IS_FATAL ANY)
+message("${plain}")
+string(REGEX MATCHALL "sizeof" sizes "${plain}")
+list(LENGTH sizes count)
+if(count LESS 8)
+  message(FATAL_ERROR "sizes of ${count} classes, expected those of all public headers")
+endif()
+if(NOT plain STREQUAL avx2)
+  message(FATAL_ERROR "compiled with AVX2, the same program prints\n${avx2}")
+endif()
