@@ -33,13 +33,15 @@ void bind_adam_options(py::module_& m) {
         .def(py::init(&options_from<AdamOptions>))
         .def_readwrite("epochs", &AdamOptions::epochs, ">= 1")
         .def_readwrite("batch", &AdamOptions::batch, "Pairs, >= 1.")
-        .def_readwrite("learning_rate", &AdamOptions::learning_rate, "Of stage 1, > 0.")
-        .def_readwrite("fine_learning_rate", &AdamOptions::fine_learning_rate, "Of stage 2, > 0.")
-        .def_readwrite("decay", &AdamOptions::decay, "Of either by a step, in (0, 1].")
+        .def_readwrite("learning_rate", &AdamOptions::learning_rate,
+                       "Learning rate of stage 1, > 0.")
+        .def_readwrite("fine_learning_rate", &AdamOptions::fine_learning_rate,
+                       "Learning rate of stage 2, > 0.")
+        .def_readwrite("decay", &AdamOptions::decay, "Factor of either with each step, in (0, 1].")
         .def_readwrite("fine_from", &AdamOptions::fine_from,
                        "Share of all steps at which stage 2 begins, in [0, 1].")
         .def_readwrite("translation_scales", &AdamOptions::translation_scales,
-                       "Of Eq. (translation), 1 to 3.");
+                       "Scales of Eq. (translation), 1 to 3.");
 }
 
 void bind_cameras(py::class_<CalibrationOptions>& options) {
@@ -101,7 +103,7 @@ void bind_calibration_options(py::module_& m) {
     options.def(py::init(&options_from<CalibrationOptions>))
         .def_readwrite("max_frames", &CalibrationOptions::max_frames,
                        "Pairs used, spread over the footage; >= 1.")
-        .def_readwrite("seed", &CalibrationOptions::seed, "Of the frame choice.")
+        .def_readwrite("seed", &CalibrationOptions::seed, "Seed of the frame choice.")
         .def_readwrite("num_threads", &CalibrationOptions::num_threads, "0 uses every core.")
         .def_readwrite("working_width", &CalibrationOptions::working_width,
                        "References are reduced by a whole factor to at most this width [px].")

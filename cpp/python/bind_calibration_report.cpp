@@ -15,7 +15,7 @@ void bind_level_report(py::module_& m) {
         .def_readonly("stage", &LevelReport::stage, "1 or 2, as in the paper.")
         .def_readonly("width", &LevelReport::width, "[px]")
         .def_readonly("height", &LevelReport::height, "[px]")
-        .def_readonly("iterations", &LevelReport::iterations, "Of Levenberg-Marquardt.")
+        .def_readonly("iterations", &LevelReport::iterations, "Iterations of Levenberg-Marquardt.")
         .def_readonly("initial_cost", &LevelReport::initial_cost,
                       "Eq. (image_loss), and, where they act, the flow term and the prior.")
         .def_readonly("final_cost", &LevelReport::final_cost, "The same at the end.")
@@ -24,7 +24,7 @@ void bind_level_report(py::module_& m) {
         .def_readonly("valid_share", &LevelReport::valid_share,
                       "Share of the reference's edge energy that the source covers.")
         .def_readonly("condition_number", &LevelReport::condition_number,
-                      "Of the normal equations, columns scaled to unit norm.")
+                      "Condition number of the normal equations, columns scaled to unit norm.")
         .def_readonly("seconds", &LevelReport::seconds, "[s]")
         .def_readonly("stopped", &LevelReport::stopped, "Why it stopped.");
 }
@@ -35,7 +35,7 @@ void bind_candidate_report(py::module_& m) {
         .def_readonly("score", &CandidateReport::score, "Contrast against the typical value.")
         .def_readonly("correlation", &CandidateReport::correlation,
                       "Pooled over the frames, of doubled angles, in [-1, 1].")
-        .def_readonly("overlap", &CandidateReport::overlap, "Of both images' edges.")
+        .def_readonly("overlap", &CandidateReport::overlap, "Overlap of both images' edges.")
         .def_readonly("refined_nec", &CandidateReport::refined_nec, "After the coarse levels.")
         .def_readonly("found", &CandidateReport::found, "Rig, by the search.")
         .def_readonly("refined", &CandidateReport::refined, "Rig, after the coarse levels.");
@@ -43,7 +43,7 @@ void bind_candidate_report(py::module_& m) {
 
 void bind_adam_step(py::module_& m) {
     py::class_<AdamStep>(m, "AdamStep", "Before a step of Adam is taken: means over its batch.")
-        .def_readonly("learning_rate", &AdamStep::learning_rate, "Of the step.")
+        .def_readonly("learning_rate", &AdamStep::learning_rate, "Learning rate of the step.")
         .def_readonly("image", &AdamStep::image, "Eq. (image_loss).")
         .def_readonly("flow", &AdamStep::flow, "Eq. (flow_loss), in half widths of the reference.")
         .def_readonly("prior", &AdamStep::prior, "Eq. (camera_regularization).")
@@ -67,26 +67,26 @@ void bind_calibration_report(py::module_& m) {
             "(reprojection and sampling of the passes over image pairs), `value` (the rest of the\n"
             "passes without derivatives), `jacobian` (the rest of those with them), `solver` "
             "(Ceres\n"
-            "itself). Of what threads do side by side, their sum divided by their number.")
+            "itself): the sum over threads divided by their number.")
         .def_readonly("working_width", &CalibrationReport::working_width, "[px]")
         .def_readonly("working_height", &CalibrationReport::working_height, "[px]")
         .def_readonly("nec", &CalibrationReport::nec, "At the finest level.")
         .def_readonly("baseline_nec", &CalibrationReport::baseline_nec,
                       "Typical of rigs displaced by many pixels.")
         .def_readonly("contrast", &CalibrationReport::contrast,
-                      "Of the NEC above the baseline, in deviations over displacements.")
+                      "NEC above the baseline, in deviations over displacements.")
         .def_readonly("repeatability_px", &CalibrationReport::repeatability_px,
                       "Median distance between fits to two halves of the frames [working px].")
         .def_readonly(
             "visible_shift_px", &CalibrationReport::visible_shift_px,
-            "Of the shift, linear over the image, that flow between the registered images\n"
-            "still sees: the length that 90 % of the pixels do not exceed [working px];\n"
-            "NaN where it cannot tell.")
+            "Shift, linear over the image, that flow between the registered images still sees:\n"
+            "the length that 90 % of the pixels do not exceed [working px]; NaN where it is not\n"
+            "known.")
         .def_readonly("valid_share", &CalibrationReport::valid_share,
-                      "Of the reference's edge energy.")
+                      "Share of the reference's edge energy.")
         .def_readonly("frames", &CalibrationReport::frames, "Indices of the pairs used.")
         .def_readonly("candidates", &CalibrationReport::candidates,
-                      "Of the search, best score first.")
+                      "Candidates of the search, best score first.")
         .def_readonly("levels", &CalibrationReport::levels, "In the order solved.")
         .def_readonly("steps", &CalibrationReport::steps, "AdamStep, of solver 'adam'.")
         .def("brief", &CalibrationReport::brief, "One line.")

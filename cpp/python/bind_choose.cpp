@@ -21,7 +21,7 @@ void bind_choose(py::module_& m) {
                  return candidate;
              }),
              py::arg("index"), py::arg("reason"), "A frame that cannot be decoded.")
-        .def_readonly("index", &Candidate::index, "Of the frame in the footage.")
+        .def_readonly("index", &Candidate::index, "Index of the frame in the footage.")
         .def_readonly("decoded", &Candidate::decoded, "Whether there were images to look at.")
         .def_readonly("taken", &Candidate::taken, "Whether it is in the choice.")
         .def_readonly("reason", &Candidate::reason, "Why it was taken or left.")
@@ -45,7 +45,7 @@ void bind_choose(py::module_& m) {
         "The Candidate of a frame; depth (h, w) float32 [m], None leaves it out of the choice.");
     py::class_<Choice>(m, "Choice",
                        "The frames to calibrate on, and what was found out on the way.")
-        .def_readonly("indices", &Choice::indices, "Of the frames taken, rising.")
+        .def_readonly("indices", &Choice::indices, "Indices of the frames taken, rising.")
         .def_readonly("candidates", &Choice::candidates, "Every frame looked at, in order.")
         .def_property_readonly("unusable", &Choice::unusable,
                                "Candidates that something was found against: they never were in "
@@ -54,7 +54,7 @@ void bind_choose(py::module_& m) {
              "One line per candidate: its name, what was measured, why it was taken or left.");
     m.def("choose", &choose, py::arg("candidates"), py::arg("max_frames"),
           py::call_guard<py::gil_scoped_release>(),
-          "The Choice of at most max_frames of the candidates that say most about the rig; without "
+          "The Choice of at most max_frames of the candidates that determine the rig best; without "
           "a usable one it is empty.");
 }
 

@@ -42,7 +42,7 @@ void bind_estimate(py::module_& m) {
              py::arg("peak"))
         .def_readonly("offset", &OffsetEstimate::offset,
                       "By how much the source's clock is late [s]; 0 where the footage does not "
-                      "tell.")
+                      "show it.")
         .def_readonly("trusted", &OffsetEstimate::trusted, "Whether it does.")
         .def_readonly("correlation", &OffsetEstimate::correlation,
                       "Height of the peak, in [-1, 1].")
@@ -77,7 +77,7 @@ void bind_refine(py::module_& m) {
         "A clock offset chosen by how well frames register, and what speaks for it.")
         .def_readonly("offset", &RefinedOffset::offset,
                       "By how much the source's clock is late [s]; the middle candidate where "
-                      "nothing is told.")
+                      "it is not known.")
         .def_readonly("told", &RefinedOffset::told,
                       "Whether the frames register worse at both ends of the candidates.")
         .def_readonly("scores", &RefinedOffset::scores,
@@ -107,7 +107,7 @@ void bind_refine(py::module_& m) {
           R"(Chooses among candidate offsets [s], rising, around a guess in their middle.
 
 references, sources: times of their frames [s]. score: the RegisteredNec of a reference and a source
-frame, by their indices, None where one cannot be decoded. Of the candidates that differ from the
+frame, by their indices, None where one cannot be decoded. Among the candidates that differ from the
 best by less than the frames do among each other (two standard errors of the mean), the one nearest
 to the middle is taken. max_frames: of the slower stream, spread over the footage. Raises InputError
 without candidates.)");

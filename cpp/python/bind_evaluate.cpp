@@ -47,15 +47,14 @@ void bind_evaluate(py::module_& m) {
              py::arg("num_threads") = 0,
              "width: the reference is reduced by the smallest integer that makes it at most this "
              "wide [px]. num_threads: 0 means all cores.")
-             "wide [px]. num_threads: 0 means all cores.")
         .def(
             "add",
             [](Evaluator& evaluator, const py::object& reference, const py::object& source,
                const py::object& depth) {
-        const Held r = image_of("reference", reference), s = image_of("source", source);
-        const Held d = depth_of("depth", depth);
-        const py::gil_scoped_release released;
-        evaluator.add(r.view, s.view, d.view);
+                const Held r = image_of("reference", reference), s = image_of("source", source);
+                const Held d = depth_of("depth", depth);
+                const py::gil_scoped_release released;
+                evaluator.add(r.view, s.view, d.view);
             },
             py::arg("reference"), py::arg("source"), py::arg("depth"),
             "Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m].")

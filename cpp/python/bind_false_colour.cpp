@@ -8,7 +8,7 @@ namespace xcalib {
 
 void bind_false_colour(py::module_& m) {
     py::class_<ColorMap>(m, "ColorMap", "A curve in the colour cube, from cold to hot.")
-        .def_readonly("name", &ColorMap::name, "Of a known map, or `estimated`.")
+        .def_readonly("name", &ColorMap::name, "Name of a known map, or `estimated`.")
         .def_property_readonly(
             "curve",
             [](const ColorMap& map) {

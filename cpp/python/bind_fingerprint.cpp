@@ -13,8 +13,8 @@ namespace py = pybind11;
 void bind_fingerprint(py::module_& m) {
     m.def(
         "fingerprint", [](const std::string& data) { return fingerprint(data); }, py::arg("data"),
-        "16 hexadecimal digits of a text, or of bytes: it tells changes by accident, not by "
-        "intent.");
+        "16 hexadecimal digits of a text, or of bytes: it detects accidental "
+        "changes, not intended ones.");
     m.def(
         "rig_fingerprint", [](const Rig& rig) { return fingerprint(rig); }, py::arg("rig"),
         "The fingerprint() of all numbers of a rig.");

@@ -35,10 +35,11 @@ py::tuple flow_of(const py::object& reference, const py::object& warped, const p
 void bind_flow(py::module_& m) {
     py::class_<FlowOptions>(m, "FlowOptions", "Options of patch_flow().")
         .def(py::init(&options_from<FlowOptions>))
-        .def_readwrite("step", &FlowOptions::step, "Of the grid of patches [px], odd, >= 3.")
+        .def_readwrite("step", &FlowOptions::step,
+                       "Distance of patches on their grid [px], odd, >= 3.")
         .def_readwrite("patch", &FlowOptions::patch,
                        "Side of a patch [px], an odd multiple of the step.")
-        .def_readwrite("levels", &FlowOptions::levels, "Of the pyramid, >= 1.")
+        .def_readwrite("levels", &FlowOptions::levels, "Levels of the pyramid, >= 1.")
         .def_readwrite("max_shift", &FlowOptions::max_shift,
                        "Farthest shift that the coarsest level looks for [px], >= 1.")
         .def("validate", &FlowOptions::validate,

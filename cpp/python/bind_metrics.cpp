@@ -87,11 +87,11 @@ only, as the authors' code) or "printed" (Eq. (gradient_clamping) as printed).)"
                "Peak signal-to-noise ratio [dB], 20 log10(data_range / RMSE). Images, mask "
                "and data_range as in ssim().");
 
-    m.def(
-        "patch_shifts", &patch_shifts, py::arg("reference"), py::arg("registered"),
-        py::arg("mask") = py::none(),
-        "(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches that tell; see "
-        "metrics.patch_residual().");
+    m.def("patch_shifts", &patch_shifts, py::arg("reference"), py::arg("registered"),
+          py::arg("mask") = py::none(),
+          "(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches with a clear "
+          "peak; see "
+          "metrics.patch_residual().");
 }
 
 }  // namespace xcalib

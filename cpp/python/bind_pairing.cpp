@@ -99,7 +99,7 @@ source time t + offset; not 0: by time. Raises InputError.)");
           R"(The depth map, as an index into depths, of each of the references used.
 
 Files under the names of the frames are theirs, and others are left over. Else the nearest in time
-within half a period of the references, where both tell it; else by pair_files, of all references or
+within half a period of the references, where both have times; else by pair_files, of all references or
 of those in use. Raises InputError.)");
     m.def("nearest_depths", &nearest_depths, py::arg("references"), py::arg("used"),
           py::arg("depths"), py::arg("where"),

@@ -21,13 +21,14 @@ never beyond far, which is also the depth at and above the horizon.)")
              py::arg("hfov_deg") = PlaneDepth{}.hfov_deg,
              py::arg("roll_deg") = PlaneDepth{}.roll_deg, "Raises InputError: field, value, range.")
         .def_readonly("camera_height", &PlaneDepth::camera_height,
-                      "Of the reference camera above the road [m], > 0.")
+                      "Height of the reference camera above the road [m], > 0.")
         .def_readonly("horizon", &PlaneDepth::horizon,
                       "Its row in the middle column, as a fraction of the image height from the "
                       "top, (-1, 1).")
         .def_readonly("far", &PlaneDepth::far, "Largest depth [m], > 0.")
-        .def_readonly("hfov_deg", &PlaneDepth::hfov_deg,
-                      "Of the reference camera [deg], (0, 180); pixels are square.")
+        .def_readonly(
+            "hfov_deg", &PlaneDepth::hfov_deg,
+            "Horizontal field of view of the reference camera [deg], (0, 180); pixels are square.")
         .def_readonly("roll_deg", &PlaneDepth::roll_deg,
                       "How far the horizon falls towards the right [deg], (-45, 45).")
         .def_property_readonly(

@@ -8,12 +8,11 @@ and the unregistered source over the *same* pixels: those the registration can f
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
-from ._core import Evaluation, Evaluator, Rig
+from ._core import Evaluation, Evaluator, Rig, evaluation_document
 from .frames import Image
 
-__all__ = ["Evaluation", "Evaluator", "as_document", "evaluate"]
+__all__ = ["Evaluation", "Evaluator", "evaluate", "evaluation_document"]
 
 
 def evaluate(
@@ -43,18 +42,3 @@ def evaluate(
     for reference, source, depth in zip(references, sources, depths, strict=True):
         evaluator.add(reference, source, depth)
     return evaluator.result()
-
-
-def as_document(evaluation: Evaluation) -> dict[str, Any]:
-    """Everything as plain numbers, for JSON."""
-    return {
-        "size": list(evaluation.size),
-        "valid_share": evaluation.valid_share,
-        "registered": evaluation.registered,
-        "unregistered": evaluation.unregistered,
-        "gain_percent": evaluation.gain_percent,
-        "frames": [
-            {"registered": registered, "unregistered": unregistered}
-            for registered, unregistered in evaluation.frames
-        ],
-    }

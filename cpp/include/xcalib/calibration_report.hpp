@@ -50,7 +50,7 @@ struct CalibrationReport {
     double baseline_nec = 0.0;      // at half that size, of the rig turned off its place
     double contrast = 0.0;          // of the NEC above that, in its deviations over displacements
     double repeatability_px = 0.0;  // between fits to two halves of the frames [working px]
-    double visible_shift_px = 0.0;  // that flow still sees [working px]; NaN where it cannot tell
+    double visible_shift_px = 0.0;  // that flow still sees [working px]; NaN where it is not known
     double valid_share = 0.0;
     std::vector<int> frames;  // indices of the pairs used
     std::vector<CandidateReport> candidates;

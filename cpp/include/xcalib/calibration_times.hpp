@@ -4,8 +4,8 @@
 
 namespace XCALIB_EXPORT xcalib {
 
-// Where the time of a calibration goes [s]. Of what threads do side by side, their sum divided by
-// their number. What they leave is the verdict's bookkeeping, flow and waiting.
+// Where the time of a calibration goes [s]: the sum over threads divided by their number. The rest
+// is the verdict, flow and waiting.
 struct CalibrationTimes {
     double prepare = 0.0;   // working images and the levels of their pyramid
     double search = 0.0;    // the global search

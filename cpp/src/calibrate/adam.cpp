@@ -227,20 +227,20 @@ void solve_adam(const WorkingImages& images, const Plan& plan,
         const BatchLoss loss = batch_loss(images, level, batch, plan, rig);
         const Loss prior = prior_loss(paper, rig, held);
         const double gamma = stage == 1 ? options.prior_weight : 0.0;
-        AdamStep told;
-        told.learning_rate =
+        AdamStep taken;
+        taken.learning_rate =
             (stage == 1 ? schedule.learning_rate : schedule.fine_learning_rate) *
             std::pow(schedule.decay, static_cast<double>(stage == 1 ? step : step - fine_from));
-        told.image = loss.image;
-        told.flow = loss.flow;
-        told.prior = prior.value;
-        told.total = loss.image + options.flow_weight * loss.flow + gamma * prior.value;
-        report.steps.push_back(told);
+        taken.image = loss.image;
+        taken.flow = loss.flow;
+        taken.prior = prior.value;
+        taken.total = loss.image + options.flow_weight * loss.flow + gamma * prior.value;
+        report.steps.push_back(taken);
         const PaperVector gradient =
             paper_jacobian(paper, rig).transpose() *
                 (loss.image_gradient + options.flow_weight * loss.flow_gradient) +
             gamma * prior.gradient;
-        adam.step(x, gradient, frozen(stage, options), told.learning_rate);
+        adam.step(x, gradient, frozen(stage, options), taken.learning_rate);
         rig = rig_from_paper(paper_of(x), rig.reference.width, rig.reference.height,
                              rig.source.width, rig.source.height);
         progress(static_cast<double>(step + 1) / static_cast<double>(count));
@@ -250,7 +250,7 @@ void solve_adam(const WorkingImages& images, const Plan& plan,
         LevelReport entry = report_on(level, stage, rig, options.num_threads);
         entry.iterations = static_cast<int>(step + 1 - from);
         entry.initial_cost = report.steps[from].total;
-        entry.final_cost = told.total;
+        entry.final_cost = taken.total;
         entry.seconds = seconds_now() - began;
         entry.stopped = format("the schedule ended after %zu steps", step + 1);
         report.levels.push_back(entry);

@@ -27,7 +27,7 @@ PaperParameters paper_of(const PaperVector& variables);
 Eigen::Matrix<double, kNumParameters, kNumPaperVariables> paper_jacobian(
     const PaperParameters& parameters, const Rig& sizes);
 
-// From `rig`, which is replaced; writes the report's steps and levels. `progress` is told the share
+// From `rig`, which is replaced; writes the report's steps and levels. `progress` gets the share
 // of the steps taken.
 void solve_adam(const WorkingImages& images, const Plan& plan,
                 const std::function<void(double)>& progress, Rig& rig, CalibrationReport& report);

@@ -60,8 +60,8 @@ void search_and_refine(const WorkingImages& images, const ImageView& reference,
     // All frames, from the level at which the start was found on some of them.
     const int from = plan.from_coarsest ? kFactors[0] : found.levels.back().factor;
     double limit = 0;
-    // The middle levels decide; what the coarse one leaves they find, and at the finest a step
-    // costs most.
+    // Half size decides, so it is solved to the finer tolerance: it makes up for what the coarse
+    // level leaves, and at full size a step costs most.
     const auto tolerance = [](int factor) { return factor == 2 ? 1e-6 : 1e-5; };
     const std::vector<Step> steps =
         schedule(report.working_width, report.working_height, plan.parts);

@@ -12,7 +12,7 @@
 namespace xcalib {
 namespace {
 
-// What is far may go to infinity, but for this share.
+// Share of the way to infinity that a shift may bring what is far.
 constexpr double kNearInfinity = 0.98;
 
 // The least of f over [low, high]: on a grid, then by golden section beside its best point.
@@ -90,7 +90,7 @@ double farthest_inverse_depth(const WorkingImages& images) {
 }
 
 double ordinary_shift(const Rig& rig, double farthest) {
-    // Deviations of what is usual: shares of the image size, and of the focal length.
+    // Usual deviations: shares of the image size, and of the focal length.
     constexpr double kCentre = 0.02, kAspect = 0.005, kSkew = 0.005;
     const auto strangeness = [&](double shift) {
         const Pinhole camera = with_shifted_depth(rig, shift).source;
@@ -105,7 +105,7 @@ double ordinary_shift(const Rig& rig, double farthest) {
 }
 
 double best_shift(const WorkingImages& all_images, const Plan& plan, double farthest, Rig& rig) {
-    // What a shift leaves, once the rig is solved anew, is seen at full size only.
+    // The error that a shift leaves once the rig is solved again shows at full size only.
     constexpr std::size_t kFrames = 8;
     WorkingImages images = all_images.spread(kFrames);
     // Without the edges of the depth as given: all shifts compare the same pixels.

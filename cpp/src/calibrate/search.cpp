@@ -75,7 +75,7 @@ MapSampler map_sampler(const DirectionMap& map, const Pinhole& camera,
     return sampler;
 }
 
-// Edges drawn on a map, of unit energy over it: each frame has one say.
+// Edges drawn on a map, with unit energy over it, so that all frames weigh alike.
 std::vector<Complex> draw(const EdgeMap& edges, const MapSampler& sampler) {
     std::vector<Complex> drawn(sampler.u.size());
     double energy = 0;
@@ -366,10 +366,10 @@ std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& reference
         if (r == 0) {
             // The field of view of the reference bends the map towards its rim, but hardly changes
             // which scale and roll agree.
-            constexpr std::size_t kLeast = 12, kPart = 3;
+            constexpr std::size_t kMin = 12, kPart = 3;
             const auto better = [](const Trial& a, const Trial& b) { return a.best > b.best; };
             std::stable_sort(trials.begin(), trials.end(), better);
-            trials.resize(std::min(trials.size(), std::max(kLeast, trials.size() / kPart)));
+            trials.resize(std::min(trials.size(), std::max(kMin, trials.size() / kPart)));
             promising = trials;
         }
     }

@@ -74,7 +74,7 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
 }
 
 // What candidates are compared by: how well edges agree beyond chance, and over how much of the
-// image. Chance grows as the overlap shrinks. Of a NecValue or a LevelReport.
+// image. Chance grows as the overlap shrinks. `value`: a NecValue or a LevelReport.
 template <class Value>
 double merit(const Value& value) {
     return value.aligned * std::sqrt(value.valid_share);
@@ -292,7 +292,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         schedule(images.references[0].width, images.references[0].height, {})[0].factor;
     const bool focal_free = !initial && !options.reference_camera && !options.reference_hfov_deg &&
                             !options.source_camera;
-    // Placing costs hundreds of evaluations: fewer frames tell enough.
+    // Placing costs hundreds of evaluations: fewer frames are enough.
     const WorkingImages few = images.spread(kFew);
     const InverseDepths inverse = inverse_depths(few.pyramid.at(kCoarse));
     std::vector<Candidate> candidates;
@@ -323,7 +323,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
     quick.options.max_iterations = std::min(options.max_iterations, 30);
     constexpr double kTolerance = 3e-5;
 
-    // Halving: each level costs four times the last, and tells more.
+    // Halving: each level costs four times the last, and separates candidates better.
     for (std::size_t s = 0; s + 1 < steps.size() || s == 0; ++s) {
         if (s > 0 && steps[s].factor == 1) break;
         // Flow is expensive, and with one candidate nothing is compared: the refinement does the

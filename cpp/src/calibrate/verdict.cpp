@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Half resolution: fine enough to tell a fit from a near miss, a quarter of the cost.
+// Half resolution: fine enough to separate a fit from a near miss, a quarter of the cost.
 constexpr int kFactor = 2;
 
 // NEC of the same rig turned off its place: what the footage gives where nothing is aligned.

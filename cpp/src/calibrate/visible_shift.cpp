@@ -13,8 +13,8 @@ namespace {
 
 constexpr int kFactor = 2, kMaxShift = 12;  // [px of that level]
 constexpr std::size_t kPairs = 4;
-constexpr double kCells = 0.1;  // of those that the source sees, the share that flow must tell of
-constexpr double kShare = 0.9;  // of the pixels, which are shifted by no more than what is told
+constexpr double kCells = 0.1;  // share of those that the source sees for which flow must be known
+constexpr double kShare = 0.9;  // of the pixels, which are shifted by no more than the result
 constexpr double kSoft = 0.5;   // [px of the level] up to which all residuals count alike
 
 // Where the rig maps a reference pixel, and whether the source sees it there.
@@ -32,7 +32,7 @@ struct Place {
     }
 };
 
-// What a shift that is linear in x and y is a product with.
+// The row of a pixel in the linear system: a shift that is linear in x and y is row * coefficients.
 Eigen::RowVector3d row_of(const Pinhole& reference, double x, double y) {
     return {1, 2 * x / reference.width - 1, 2 * y / reference.height - 1};
 }
@@ -41,7 +41,7 @@ Eigen::RowVector3d row_of(const Pinhole& reference, double x, double y) {
 Eigen::Matrix<double, 3, 2> linear_part(const std::vector<Eigen::RowVector3d>& rows,
                                         const std::vector<Eigen::RowVector2d>& shifts,
                                         const std::vector<double>& weights) {
-    // Slopes that flow tells of in a strip only are not carried over the whole image.
+    // Slopes that are known in a strip only are not carried over the whole image.
     constexpr double kRidge = 0.01;
     constexpr int kRounds = 8;
     Eigen::Matrix<double, 3, 2> fitted = Eigen::Matrix<double, 3, 2>::Zero();
@@ -66,7 +66,7 @@ double visible_shift(const WorkingImages& images, const Rig& rig, int num_thread
     const WorkingImages few = images.spread(kPairs);
     const std::vector<FlowTargets> flow =
         estimate_flow(few, kFactor, rig, nullptr, kMaxShift, num_threads);
-    std::vector<Eigen::RowVector3d> seen, told;
+    std::vector<Eigen::RowVector3d> seen, known;
     std::vector<Eigen::RowVector2d> shifts;
     std::vector<double> weights;
     for (std::size_t i = 0; i < flow.size(); ++i) {
@@ -80,16 +80,16 @@ double visible_shift(const WorkingImages& images, const Rig& rig, int num_thread
         for (const FlowTarget& target : flow[i].targets) {
             const Place place(here, target.x, target.y, target.depth);
             if (!place.seen) continue;
-            told.push_back(row_of(here.reference, target.x, target.y));
+            known.push_back(row_of(here.reference, target.x, target.y));
             shifts.emplace_back(reference_px *
                                 (Eigen::Vector2d(target.u, target.v) - place.at).transpose());
             weights.push_back(target.weight);
         }
     }
-    if (told.empty() ||
-        static_cast<double>(told.size()) < kCells * static_cast<double>(seen.size()))
+    if (known.empty() ||
+        static_cast<double>(known.size()) < kCells * static_cast<double>(seen.size()))
         return std::numeric_limits<double>::quiet_NaN();
-    const Eigen::Matrix<double, 3, 2> fitted = linear_part(told, shifts, weights);
+    const Eigen::Matrix<double, 3, 2> fitted = linear_part(known, shifts, weights);
     std::vector<double> lengths;
     for (const Eigen::RowVector3d& row : seen) lengths.push_back((row * fitted).norm());
     return kFactor * quantile(std::move(lengths), kShare);

@@ -5,10 +5,10 @@
 
 namespace xcalib {
 
-// Of the shift that varies linearly over the image: the length that 90 % of the pixels do not
-// exceed [working px]. What a wrong rig leaves varies so, roughly, and what flow mistakes does not.
-// NaN where flow can tell of too little of what the source sees. The built-in flow, on up to 4
-// pairs.
+// The shift is fitted as linear over the image; returned is the length that 90 % of the pixels do
+// not exceed [working px]. What a wrong rig leaves varies so, roughly, and what flow mistakes does
+// not. NaN where flow is known for too little of what the source sees. The built-in flow, on up to
+// 4 pairs.
 double visible_shift(const WorkingImages& images, const Rig& rig, int num_threads);
 
 }  // namespace xcalib

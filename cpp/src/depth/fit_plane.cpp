@@ -37,7 +37,7 @@ std::vector<int> frames_to_judge_plane(int count) {
 
 PlaneDepth fit_plane(const std::vector<ImageView>& references,
                      const std::vector<ImageView>& sources, const PlaneDepth& plane, const Rig& rig,
-                     const CalibrationOptions& options, const std::function<void()>& tell) {
+                     const CalibrationOptions& options, const std::function<void()>& progress) {
     CalibrationOptions quick;
     quick.num_threads = options.num_threads;
     quick.working_width = std::min(kWidth, options.working_width);
@@ -60,7 +60,7 @@ PlaneDepth fit_plane(const std::vector<ImageView>& references,
         const std::vector<ImageView> depths(references.size(), depth.view());
         const CalibrationResult result = calibrate(references, sources, depths, start, quick);
         known[key(candidate)] = {result.report.nec, result.rig};
-        if (tell) tell();
+        if (progress) progress();
     };
 
     PlaneDepth best = plane;

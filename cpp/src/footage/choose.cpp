@@ -25,7 +25,7 @@ constexpr int kScales = 17;             // trial widths of the source's view on 
 constexpr double kSmallestScale = 0.4;  // equal fields of view at 1,
 constexpr double kLargestScale = 2.5;   // geometric between these
 constexpr int kPooled = 16;             // frames that vote on the one alignment, at most
-constexpr double kPrior = 0.1;          // known beforehand, as a share of what one frame tells
+constexpr double kPrior = 0.1;          // known beforehand, as a share of what one frame adds
 // Edges below this share of the median frame's: a closed shutter, or no light at all.
 constexpr double kFlat = 0.15;
 // Edges below this, in the image's units, are rounding: a constant image.

@@ -20,9 +20,9 @@ namespace {
 constexpr int kRows = 4, kColumns = 6;  // cells
 constexpr int kCells = kRows * kColumns;
 constexpr int kWidth = 160;              // at which edges are taken [px]
-constexpr double kMinCorrelation = 0.2;  // of a peak that tells
+constexpr double kMinCorrelation = 0.2;  // of a peak that counts
 constexpr double kMinContrast = 0.12;    // what it stands above every other [correlation]
-constexpr std::size_t kFewest = 16;      // frames, and samples in common, that can tell
+constexpr std::size_t kMinCount = 16;    // frames, and samples in common, that are enough
 constexpr int kEitherWay = 24;           // quarters of a frame
 
 double mean(const std::vector<double>& values) {
@@ -66,7 +66,7 @@ Motion edge_motion(const std::vector<double>& times, std::size_t begin, std::siz
     double last = 0;
     for (std::size_t i = begin; i < end; ++i) {
         std::optional<Image> edges = edges_of(static_cast<int>(i));
-        if (!edges) continue;  // named when its turn comes; the next ones tell
+        if (!edges) continue;  // named when its turn comes; the next ones will do
         if (!before.pixels.empty()) {
             cv::Mat change, cells;
             cv::absdiff(as_mat(*edges), as_mat(before), change);
@@ -120,16 +120,16 @@ struct Samples {
 };
 
 // Footage with pauses has fewer frames than samples; where it is all pause, its times are wrong.
-constexpr double kMostSamples = 32;  // a frame
+constexpr double kMaxSamples = 32;  // a frame
 
 Samples resampled(Motion motion, double step) {
     const double first = std::ceil(motion.times.front() / step);
     const double last = std::floor(motion.times.back() / step);
-    if (last - first > kMostSamples * static_cast<double>(motion.times.size()))
+    if (last - first > kMaxSamples * static_cast<double>(motion.times.size()))
         throw InputError(format(
             "times from %.3f to %.3f s have %zu frames, expected one at least"
             " every %g s in the mean",
-            motion.times.front(), motion.times.back(), motion.times.size(), kMostSamples * step));
+            motion.times.front(), motion.times.back(), motion.times.size(), kMaxSamples * step));
     Samples out{first * step, {}};
     for (std::vector<double>& column : motion.columns) {
         clean(column);
@@ -146,7 +146,7 @@ double correlation(const Samples& a, const Samples& b, long shift) {
     const long length = static_cast<long>(a.columns[0].size());
     const long other = static_cast<long>(b.columns[0].size());
     const long begin = std::max(0L, -shift), end = std::min(length, other - shift);
-    if (end - begin < static_cast<long>(kFewest)) return -1.0;
+    if (end - begin < static_cast<long>(kMinCount)) return -1.0;
     double cells = 0, whole = 0;
     for (std::size_t c = 0; c < a.columns.size(); ++c) {
         const double *x = a.columns[c].data(), *y = b.columns[c].data() + shift;
@@ -276,7 +276,7 @@ OffsetEstimate estimate_offset(const std::vector<double>& references,
                    " times %.3f to %.3f s",
                    sources.front(), sources.back(), max_offset, begin_time, end_time));
     const auto near = static_cast<std::size_t>(end_source - begin_source);
-    if (wanted < kFewest || near < kFewest) return {};
+    if (wanted < kMinCount || near < kMinCount) return {};
     const auto place = [](auto i) { return static_cast<std::ptrdiff_t>(i); };
     const double step =
         std::max(
@@ -287,7 +287,7 @@ OffsetEstimate estimate_offset(const std::vector<double>& references,
     const auto other = static_cast<std::size_t>(begin_source - sources.begin());
     Motion one = edge_motion(references, first, end, reference_edges);
     Motion two = edge_motion(sources, other, other + near, source_edges);
-    if (std::min(one.times.size(), two.times.size()) + 1 < kFewest) return {};
+    if (std::min(one.times.size(), two.times.size()) + 1 < kMinCount) return {};
     return best_offset(resampled(std::move(one), step), resampled(std::move(two), step), step,
                        std::min(max_offset, (end_time - begin_time) / 3));
 }

@@ -63,7 +63,7 @@ std::string numbers(const path& file) {
 
 using ByKey = std::map<std::string, int>;
 
-// Files by their key; none where keys are missing or not unique, and so tell nothing.
+// Files by their key; none where keys are missing or not unique, and so are of no use.
 ByKey by_key(const std::vector<path>& files, std::string (*key)(const path&)) {
     ByKey found;
     for (std::size_t i = 0; i < files.size(); ++i) {

@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kSoft = 2.0 / 640;  // half widths
 constexpr float kConfidence = 0.1f;  // below it a vector is not used
-// The weights are shares of all confidence, but of no less than this share of all cells: where
-// nearly nothing can be told, that is no voice as loud as the images'.
-constexpr double kLeast = 0.02;
+// Weights are shares of all confidence, but of no less than this share of all cells: where almost
+// no flow is known, the term stays weak beside the images'.
+constexpr double kMinWeight = 0.02;
 
 double unit_of(const FlowTargets& targets) {
     const Pinhole& reference = targets.rig.reference;
@@ -159,7 +159,7 @@ std::vector<FlowTargets> estimate_flow(const WorkingImages& images, int factor, 
     parallel_each(static_cast<int>(images.size()), estimator ? 1 : num_threads, estimate);
     double sum = 0, least = 0;
     for (std::size_t i = 0; i < out.size(); ++i) {
-        least += kLeast * cells[i];
+        least += kMinWeight * cells[i];
         for (const FlowTarget& target : out[i].targets) sum += target.weight;
     }
     for (FlowTargets& pair : out)

@@ -1,5 +1,5 @@
-// The flow term, Eq. (flow_loss): what residual flow says is left of the misalignment, as
-// correspondences that are held while the solver moves.
+// The flow term, Eq. (flow_loss): residual flow between the images as correspondences, which are
+// held while the solver moves.
 //
 //     rig -> warp -> flow F -> reference pixel x belongs at source point T(x + F(x))
 //

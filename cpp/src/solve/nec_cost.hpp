@@ -6,7 +6,7 @@
 
 namespace xcalib {
 
-// weight (1 - agreement). A pair whose valid share falls below `minimum_share` is charged for it,
+// weight (1 - agreement). A pair whose valid share falls below `minimum_share` is penalised for it,
 // so that no fit wins by shrinking the overlap. `sizes`: a rig of the level's image sizes.
 class NecCost : public RigCost {
    public:

@@ -6,7 +6,7 @@ Plan::Plan(const CalibrationOptions& given, const FlowEstimator& flow, const Par
     : options(given), estimator(flow), parts(kept) {
     options.validate();
     searches = options.solver != Solver::adam && options.search.mode != SearchMode::off;
-    // Who hands in an estimator wants it used.
+    // A caller who gives an estimator wants it used.
     const bool wanted =
         options.flow == FlowMode::on || (options.flow == FlowMode::automatic && flow);
     uses_flow = wanted || (options.flow == FlowMode::automatic && !searches);

@@ -27,7 +27,7 @@ struct Plan {
     Parts parts;
 
     bool searches;   // for the start; else it is given
-    bool uses_flow;  // the flow term, when everything is free and wherever nothing was searched
+    bool uses_flow;  // the flow term
     // All frames are solved from the coarsest level on, since flow reaches further the coarser the
     // level is; else from the level at which the start was found.
     bool from_coarsest;

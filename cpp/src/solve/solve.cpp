@@ -48,7 +48,7 @@ Parameters free_parameters(int stage, const CalibrationOptions& options) {
     return free;
 }
 
-// The same, as Ceres is told.
+// The same for Ceres.
 void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
             const CalibrationOptions& options) {
     const bool source_known = options.source_camera.has_value();
@@ -67,7 +67,8 @@ void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
             problem.SetParameterBlockConstant(block);
 }
 
-// Of the free parameters, columns scaled to unit norm: it tells coupled directions, not units.
+// Condition number by the free parameters, with columns scaled to unit norm: it shows coupled
+// directions, not units.
 double condition_number(ceres::Problem& problem) {
     std::vector<double*> blocks;
     problem.GetParameterBlocks(&blocks);

@@ -13,7 +13,7 @@ double seconds_now();
 // Mean over the pairs, weighted by c_i (the valid share plainly).
 NecValue pooled(const Level& level, const Rig& rig, int num_threads);
 
-// What a level says of a rig: all of the report that does not depend on how it was solved.
+// The report of a rig at a level, but for what depends on how it was solved.
 LevelReport report_on(const Level& level, int stage, const Rig& rig, int num_threads);
 
 // The valid share below which a fit is penalised that starts where it is `valid_share`.
@@ -21,7 +21,7 @@ inline double share_limit(double valid_share) { return 0.8 * valid_share; }
 
 // Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and a prior
 // that holds `anchor`, stage 2 everything free. A pair whose valid share falls below `share_limit`
-// is charged for it. It stops where a step lowers the cost by less than the share `tolerance`.
+// is penalised for it. It stops where a step lowers the cost by less than the share `tolerance`.
 LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow, int stage,
                         double share_limit, double tolerance, const Plan& plan, const Rig& anchor,
                         Rig& rig);

@@ -13,7 +13,7 @@
 namespace xcalib {
 namespace {
 
-// Bilinear sampling needs images to be smooth; what this takes of their edges is accuracy. [px]
+// Blur before bilinear sampling, which needs smooth images; more blur costs accuracy. [px]
 constexpr double kBlur = 0.6;
 
 // Source pixels to a reference pixel, in one direction, beyond which they are averaged before they

@@ -45,10 +45,10 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<ImageView>& depths,
                                   const std::vector<int>& chosen, const Plan& plan);
 
-// Depth without its edges, for the NEC of the finer levels (at coarser ones nearly everything is
-// near an edge, and a pixel's width matters less; a patch of the flow is wider): across one, the
-// warp shows a surface beside another that the source camera may not see there at all, and the step
-// between them moves with the depth, not the rig.
+// Depth without its edges, for the NEC of the finer levels: across an edge, the warp joins two
+// surfaces that the source camera may not see side by side, and the step between them moves with
+// the depth, not with the rig. Coarser levels keep them, since nearly every pixel is near one
+// there, and flow does, since its patches are wider.
 Image without_depth_edges(const Image& depth);
 
 // One level of the pyramid, made for the scale between the cameras that `rig` has.

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from .._core import CalibrationOptions, Rig
+from .._core import CalibrationOptions, Rig, _option_words
 from ..depth import MeasuredDepth, NetworkOptions, PlaneDepth
 from ..footage import Matching
 from ..inputs import Inputs
@@ -19,6 +19,8 @@ from .footage_options import FOOTAGE_OPTIONS
 from .options import options
 
 DEFAULTS = CalibrationOptions()
+WORDS = _option_words()
+"""What an option may be, by its name."""
 SEED = click.IntRange(0, 2**32 - 1)
 
 frames_arguments = options(

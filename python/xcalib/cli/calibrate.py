@@ -8,13 +8,14 @@ from typing import Any
 
 import click
 
-from .._core import CalibrationOptions, Pinhole, Rig
+from .._core import CalibrationOptions, Pinhole, Rig, _flow_arguments, report_document
 from ..flow import FlowProvider, NetworkFlow
-from ..frames import Image, InputError, check_file_writable, size_of
+from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
 from ..pipeline import choose_by_content, left_out, run_calibration, save_rig, with_fitted_plane
 from .arguments import (
     DEFAULTS,
     SEED,
+    WORDS,
     colormap_option,
     frames_arguments,
     open_frames,
@@ -22,7 +23,6 @@ from .arguments import (
     threads_option,
     with_scalar_sources,
 )
-from .documents import write_json
 from .errors import NOT_TRUSTED, stop, warn
 
 
@@ -43,10 +43,9 @@ def intrinsics(
 
 def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     """What ``--flow`` says: the mode of the options, and the provider, None for the built-in."""
-    if spec in ("auto", "off"):
-        return spec, None
-    if spec == "patch":
-        return "on", None
+    modes = _flow_arguments()
+    if spec in modes:
+        return modes[spec], None
     if not spec.endswith(".onnx"):
         raise click.UsageError(f"--flow is {spec!r}, expected auto, off, patch or a .onnx file")
     return "on", NetworkFlow(spec)
@@ -99,7 +98,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 )
 @click.option(
     "--search",
-    type=click.Choice(["auto", "full", "local", "off"]),
+    type=click.Choice(WORDS["search"]),
     default=DEFAULTS.search.mode,
     show_default=True,
     help="Global search before refinement: full, local (around the initial rig), off, or auto.",
@@ -115,7 +114,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 )
 @click.option(
     "--solver",
-    type=click.Choice(["ceres", "adam"]),
+    type=click.Choice(WORDS["solver"]),
     default=DEFAULTS.solver,
     show_default=True,
     help="adam is the paper's, which searches nothing.",
@@ -265,8 +264,7 @@ def command(
     click.echo(f"rig: {output}")
     if report_file:
         files = [frames.references.where(index) for index in chosen]
-        document = {"format": "xcalib-report", "version": 1, "rig": str(output), "files": files}
-        write_json(report_file, document | result.report.to_dict())
+        write_bytes(report_file, report_document(result.report, str(output), files).encode())
         click.echo(f"report: {report_file}")
     if not result.converged:
         stop(NOT_TRUSTED, result.report.message)

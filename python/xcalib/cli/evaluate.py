@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 from .._core import Rig
-from ..evaluate import as_document, evaluate
-from ..frames import check_file_writable
+from ..evaluate import evaluate, evaluation_document
+from ..frames import check_file_writable, write_bytes
 from ..pipeline import progress
 from .arguments import (
     colormap_option,
@@ -21,7 +21,6 @@ from .arguments import (
     threads_option,
     with_scalar_sources,
 )
-from .documents import write_json
 from .errors import NOT_TRUSTED, stop
 
 
@@ -74,6 +73,6 @@ def command(
     click.echo(result.table())
     if json_file:
         names = [frames.references.where(index) for index in range(len(frames))]
-        write_json(json_file, {"rig": str(rig_file), "files": names} | as_document(result))
+        write_bytes(json_file, evaluation_document(result, str(rig_file), names).encode())
     if not result.valid_share:
         stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")

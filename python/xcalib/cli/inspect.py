@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
 from .._core import Rig
 from ..footage import camera_infos, is_bag
-from ..inspection import describe, facts_text
+from ..inspection import facts_text, rig_document
 from .arguments import rig_argument
-from .documents import finite
 
 
 @click.command("inspect")
@@ -24,4 +22,4 @@ def command(rig_file: Path, as_json: bool) -> None:
             click.echo(info.line())
         return
     rig = Rig.load(rig_file)
-    click.echo(json.dumps(finite(describe(rig)), indent=2) if as_json else facts_text(rig))
+    click.echo(rig_document(rig) if as_json else facts_text(rig))

@@ -11,7 +11,14 @@ from .._core import Rig
 from ..footage import is_video
 from ..frames import InputError, check_file_writable, check_folder_writable
 from ..registration import RegistrationOptions, run_registration
-from .arguments import frames_arguments, open_frames, quiet_option, rig_argument, threads_option
+from .arguments import (
+    WORDS,
+    frames_arguments,
+    open_frames,
+    quiet_option,
+    rig_argument,
+    threads_option,
+)
 from .errors import NOT_TRUSTED, stop
 
 
@@ -41,7 +48,7 @@ from .errors import NOT_TRUSTED, stop
 )
 @click.option(
     "--occlusion",
-    type=click.Choice(["ignore", "mark", "hide"]),
+    type=click.Choice(WORDS["occlusion"]),
     default="mark",
     show_default=True,
     help="Pixels hidden from the source by something nearer: not marked, marked in the mask, or"

@@ -16,12 +16,12 @@ namespace XCALIB_EXPORT xcalib {
 std::vector<int> frames_to_judge_plane(int count);
 
 // The plane near `plane` whose best rig aligns most edges: a horizon that is a few pixels off bends
-// the depth of the far road, where it is largest, and no rig makes up for it, so the NEC that a fit
-// reaches tells. Height, far distance and field of view are kept: the height scales depth and
+// the depth of the far road, where it is largest, and no rig makes up for it, so that the NEC of a
+// fit decides. Height, far distance and field of view are kept: the height scales depth and
 // translation alike, and the images do not change. `rig`: fitted with `plane`, where fits start.
-// `options`: known cameras and threads are kept. `tell` is called after each fit.
+// `options`: known cameras and threads are kept. `progress` is called after each fit.
 PlaneDepth fit_plane(const std::vector<ImageView>& references,
                      const std::vector<ImageView>& sources, const PlaneDepth& plane, const Rig& rig,
-                     const CalibrationOptions& options, const std::function<void()>& tell);
+                     const CalibrationOptions& options, const std::function<void()>& progress);
 
 }  // namespace xcalib

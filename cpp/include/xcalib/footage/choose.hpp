@@ -1,9 +1,9 @@
-// Which frames to calibrate on: those that say most about the rig together.
+// Which frames to calibrate on: those that determine the rig best together.
 //
 // A cheap look at a seeded sample of the footage keeps two small edge maps and the inverse depth of
 // each candidate, never the images. Frames that cannot help are left out: undecodable, flat
 // (a closed shutter), saturated, frozen, and pairs whose edges do not agree as the others' do (out
-// of sync). Of the rest, frames are taken one by one, each the one that adds most to `log det` of
+// of sync). The rest is taken one by one, each time the frame that adds most to `log det` of
 // the information about the rig's eleven parameters, summed over the frames taken: a measure that
 // grows with edges common to both images, with their spread over the image and their directions,
 // and with the spread of depth, and that gives a second frame of the same kind less than the first.

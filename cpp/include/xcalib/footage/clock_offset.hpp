@@ -22,7 +22,7 @@ namespace XCALIB_EXPORT xcalib {
 // different parts of the scene tell, and correlated over time.
 
 struct OffsetEstimate {
-    double offset = 0.0;  // by how much the source's clock is late [s]; 0 where nothing is told
+    double offset = 0.0;  // by how much the source's clock is late [s]; 0 where it cannot be known
     bool trusted = false;
     double correlation = 0.0;  // height of the peak, in [-1, 1]
     double contrast = 0.0;     // what it stands above the best peak elsewhere
@@ -51,7 +51,7 @@ OffsetEstimate estimate_offset(const std::vector<double>& references,
 // -- From registration ----------------------------------------------------------------------------
 
 struct RefinedOffset {
-    // By how much the source's clock is late [s]; the middle candidate where nothing is told.
+    // By how much the source's clock is late [s]; the middle candidate where it cannot be known.
     double offset = 0.0;
     bool told = false;           // whether the frames register worse at both ends of the candidates
     std::vector<double> scores;  // mean NEC at each candidate; none if fewer than two can be judged
@@ -78,14 +78,14 @@ class RegisteredNec {
     std::unique_ptr<State> state_;
 };
 
-// What RegisteredNec says of two frames; none where one of them cannot be decoded.
+// RegisteredNec of two frames; none where one of them cannot be decoded.
 using PairScore = std::function<std::optional<double>(int reference, int source)>;
 
-// Chooses among `candidates` [s], rising, around a guess in their middle. Of those that differ from
-// the best by less than the frames do among each other (two standard errors of the mean), the one
-// nearest to the middle is taken: the guess, unless the frames speak against it. Candidates that
-// pair the same frames score the same. `max_frames`: of the slower stream, spread over the footage,
-// the same ones for every candidate. Throws InputError without candidates.
+// Chooses among `candidates` [s], rising, around a guess in their middle. Among those that differ
+// from the best by less than the frames do among each other (two standard errors of the mean), the
+// one nearest to the middle is taken: the guess, unless the frames speak against it. Candidates
+// that pair the same frames score the same. `max_frames`: of the slower stream, spread over the
+// footage, the same ones for every candidate. Throws InputError without candidates.
 RefinedOffset refine_offset(const std::vector<double>& references,
                             const std::vector<double>& sources,
                             const std::vector<double>& candidates, const PairScore& score,

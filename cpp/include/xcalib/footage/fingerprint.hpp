@@ -11,10 +11,10 @@
 
 namespace XCALIB_EXPORT xcalib {
 
-// 16 hexadecimal digits of any data: it tells changes by accident, not by intent.
+// 16 hexadecimal digits of any data: it detects accidental changes, not intended ones.
 std::string fingerprint(std::string_view data);
 
-// Of all numbers of a rig.
+// The same for all numbers of a rig.
 std::string fingerprint(const Rig& rig);
 
 // A path from the root, without `.` and empty parts; `..` and links stay, as the user gave them.

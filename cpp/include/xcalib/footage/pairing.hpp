@@ -78,7 +78,7 @@ Pairing pair_frames(const FrameList& references, const FrameList& sources,
 
 // The depth map of each of the references `used`. Files under the names of the frames are theirs,
 // and others are left over. Else the nearest in time within half a period of the references, where
-// both tell it; else by pair_files, of all references or of those in use. Throws InputError.
+// both have times; else by pair_files, of all references or of those in use. Throws InputError.
 std::vector<int> match_depths(const FrameList& references, const std::vector<int>& used,
                               const FrameList& depths);
 

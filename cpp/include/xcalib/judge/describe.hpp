@@ -1,4 +1,4 @@
-// What a rig says, in units one can picture.
+// The facts of a rig, in units one can picture.
 #pragma once
 
 #include <optional>
@@ -11,8 +11,8 @@
 namespace XCALIB_EXPORT xcalib {
 
 struct RigFacts {
-    // Of the source camera out of the reference camera's axes: pan to the right, then tilt up, then
-    // roll clockwise.
+    // Turn of the source camera out of the reference camera's axes: pan to the right, then tilt up,
+    // then roll clockwise.
     double pan_deg = 0.0, tilt_deg = 0.0, roll_deg = 0.0;
     Eigen::Vector3d position;  // of the source camera in the reference camera's frame [m]
     double baseline = 0.0;     // [m]

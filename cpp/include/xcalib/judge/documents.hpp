@@ -1,5 +1,5 @@
 // What the commands write for machines: JSON, indented, keys in a fixed order, null for what is not
-// finite. `rig_file` and `files` say what a document is about.
+// finite. `rig_file` and `files` name what a document is about.
 #pragma once
 
 #include <string>
