@@ -154,7 +154,7 @@ bench-docs: $(BENCH_READY) ## as bench, and rewrites docs/performance.md by what
 	$(BIN)/python bench/run.py --docs
 bench-cpp: | bench-packages
 	cmake -S . -B build/bench/cpp -G Ninja -DXCALIB_BENCH=ON -DXCALIB_WERROR=$(WERROR)
-	cmake --build build/bench/cpp
+	cmake --build build/bench/cpp --target xcalib_bench
 
 format: $(VENV)/.test-requires | test-packages ## rewrite the code in its style
 	clang-format -i $(CPP_FILES)

@@ -1,13 +1,14 @@
 """How a benchmark reports: a figure is printed, and kept where `run.py` asks for it.
 
-A figure has a name, a value with its unit, the range that its spread is told by (10 to 90 % unless
-the benchmark says otherwise), and a target, such as "<= 0.25", where one was set beforehand.
+A figure has a name, a value with its unit, a range (10 to 90 % of the repetitions unless the
+benchmark says otherwise), and a target, such as "<= 0.25", where one was set beforehand.
 """
 
 import json
 import operator
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ def figure(
     target: str | None = None,
     met: bool | None = None,
 ) -> None:
-    """One figure. `met`: where the target holds for more than this value alone."""
+    """One figure. `met` says whether the target is met where comparing `value` is not enough."""
     entry: dict[str, object] = {"name": name, "value": float(value), "unit": unit}
     text = f"{name:<58} {value:>9.4g} {unit}"
     if low is not None and high is not None:
@@ -46,7 +47,7 @@ def figure(
         entry |= {"target": target, "met": met}
         text += f"  target {target}: {'met' if met else 'NOT met'}"
     print(text, flush=True)
-    keep(entry)
+    _keep(entry)
 
 
 def spread(
@@ -60,10 +61,15 @@ def spread(
 
 def skipped(name: str, reason: str) -> None:
     print(f"skipped: {name}: {reason}", flush=True)
-    keep({"name": name, "skipped": reason})
+    _keep({"name": name, "skipped": reason})
 
 
-def keep(entry: dict[str, object]) -> None:
+def details(found: dict[str, Any]) -> None:
+    """Measurements that are kept as they are, for a table or a picture of the benchmark's own."""
+    _keep({"details": found})
+
+
+def _keep(entry: dict[str, object]) -> None:
     if path := os.environ.get(KEPT_IN):
         with Path(path).open("a") as file:
             file.write(json.dumps(entry) + "\n")

@@ -1,49 +1,55 @@
-"""The night rig: its frames, which of them no fit may see, and how a rig is judged on those."""
+"""The night rig: its frames, which of them no fit may see, its depths, its fits and views."""
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import cv2
 import numpy as np
-from common import data
+from common import data, gray
+from judge import EROSION, View
 
 import xcalib
-from xcalib import metrics
-from xcalib.depth import read_depth
+from xcalib._core import fit_plane, frames_to_judge_plane
+from xcalib.depth import PlaneDepth, read_depth
+from xcalib.depth.completion import MIN_CONFIDENCE, complete
 
 SIZE = (583, 473)
+"""Of the grid that frames are judged on, which is that of the depth maps [px]."""
 
-
-def gray(image: np.ndarray) -> np.ndarray:
-    one = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
-    return one.astype(np.float32) / 255
-
-
-@dataclass(frozen=True)
-class View:
-    """A held-out frame as it is judged."""
-
-    reference: np.ndarray
-    unregistered: np.ndarray
-    registered: np.ndarray
-    inside: np.ndarray  # valid, eroded by 2
+Depth = Callable[[str], np.ndarray]
+"""The map [m] of the frame of a name."""
 
 
 @dataclass(frozen=True)
 class NightRig:
+    """Frames go by the names of their files. The depths below are `Depth`s."""
+
     folder: Path
-    held: tuple[str, ...]  # sorted names, every fifth from the fifth
-    fitted: tuple[str, ...]
+    names: tuple[str, ...]
+    """Sorted."""
 
     @staticmethod
     def open() -> "NightRig | None":
         folder = data("lynred_night")
         if folder is None:
             return None
-        names = sorted(p.name for p in (folder / "visible").iterdir())
-        held = names[4::5]
-        return NightRig(folder, tuple(held), tuple(n for n in names if n not in held))
+        return NightRig(folder, tuple(sorted(p.name for p in (folder / "visible").iterdir())))
+
+    def fold(self, k: int) -> tuple[list[str], list[str]]:
+        """Frames to fit on, and frames to judge: every fifth from the k-th, k = 0..4."""
+        held = self.names[k::5]
+        return [n for n in self.names if n not in held], list(held)
+
+    @property
+    def fitted(self) -> list[str]:
+        return self.fold(4)[0]
+
+    @property
+    def held(self) -> list[str]:
+        """No fit of a published figure sees these."""
+        return self.fold(4)[1]
 
     @cache  # noqa: B019 one rig a run
     def visible(self, name: str) -> np.ndarray:
@@ -53,46 +59,69 @@ class NightRig:
     def thermal(self, name: str) -> np.ndarray:
         return cv2.imread(str(self.folder / "thermal" / name), cv2.IMREAD_UNCHANGED)
 
-    def depth(self, kind: str, name: str) -> np.ndarray:
-        """`depth_filled` or `depth` [m]."""
-        return read_depth(self.folder / kind / name)
+    def reference(self, name: str) -> np.ndarray:
+        """Gray, on the grid that frames are judged on."""
+        return cv2.resize(gray(self.visible(name)), SIZE, interpolation=cv2.INTER_AREA)
 
-    def fit(self, depth) -> xcalib.CalibrationResult:
-        """On the 32 frames; `depth(name)` gives the map of one."""
-        return xcalib.calibrate(
-            [self.visible(n) for n in self.fitted],
-            [self.thermal(n) for n in self.fitted],
-            [depth(n) for n in self.fitted],
+    def source(self, name: str) -> np.ndarray:
+        return gray(self.thermal(name))
+
+    # -- Depth ------------------------------------------------------------------------------------
+
+    def filled(self, name: str) -> np.ndarray:
+        """Stereo, with its holes filled."""
+        return read_depth(self.folder / "depth_filled" / name)
+
+    def semi_dense(self, name: str) -> np.ndarray:
+        """Stereo, where it is sure."""
+        return read_depth(self.folder / "depth" / name)
+
+    @cache  # noqa: B019
+    def completed(self, name: str) -> np.ndarray:
+        """Semi-dense stereo, completed by the image as `--complete` does it."""
+        dense, confidence = complete(self.semi_dense(name), self.visible(name))
+        return np.where(confidence >= MIN_CONFIDENCE, dense, 0).astype(np.float32)
+
+    def plane(self, name: str) -> np.ndarray:
+        return PlaneDepth()(0, self.visible(name))
+
+    def refined_plane(self, rig: xcalib.Rig, names: Sequence[str]) -> PlaneDepth:
+        """Horizon and roll found from some of the frames that the rig was fitted on."""
+        some = [names[i] for i in frames_to_judge_plane(len(names))]
+        images = [self.visible(n) for n in some], [self.thermal(n) for n in some]
+        return fit_plane(*images, PlaneDepth(), rig, xcalib.CalibrationOptions())
+
+    def one_depth(self, name: str) -> np.ndarray:
+        """The same everywhere: a rig fitted with it is a homography."""
+        return np.full(SIZE[::-1], 20.0, np.float32)
+
+    # -- Fitting and registering ------------------------------------------------------------------
+
+    def fit(
+        self,
+        depth: Depth,
+        names: Sequence[str] | None = None,
+        options: xcalib.CalibrationOptions | None = None,
+        how: Callable[..., xcalib.CalibrationResult] = xcalib.calibrate,
+    ) -> xcalib.CalibrationResult:
+        """On the frames that are not held out, unless others are named."""
+        names = self.fitted if names is None else names
+        return how(
+            [self.visible(n) for n in names],
+            [self.thermal(n) for n in names],
+            [depth(n) for n in names],
+            options=options or xcalib.CalibrationOptions(),
         )
 
-    def views(self, rig: xcalib.Rig, depth):
+    def registrar(self, rig: xcalib.Rig) -> xcalib.Registrar:
+        """Onto the grid that frames are judged on."""
+        return xcalib.Registrar(rig.resized(*SIZE, rig.source.width, rig.source.height))
+
+    def views(self, rig: xcalib.Rig, depth: Depth) -> Iterator[View]:
         """The held-out frames, each with its depth."""
-        registrar = xcalib.Registrar(rig.resized(*SIZE, rig.source.width, rig.source.height))
+        registrar = self.registrar(rig)
         for name in self.held:
-            thermal = gray(self.thermal(name))
-            registered, mask = registrar.register(thermal, depth(name))
-            yield View(
-                cv2.resize(gray(self.visible(name)), SIZE, interpolation=cv2.INTER_AREA),
-                cv2.resize(thermal, SIZE),
-                registered,
-                cv2.erode((mask == 0).astype(np.uint8), np.ones((5, 5), np.uint8)),
-            )
-
-
-def gains(views: list[View], same_mask: bool = False) -> dict[str, tuple[float, float]]:
-    """NEC and GC, (unregistered, registered): the one over the whole frame, or the same pixels."""
-    found = {}
-    for name, score in (("NEC", metrics.nec), ("GC", metrics.gc)):
-        before = [
-            score(v.reference, v.unregistered, v.inside if same_mask else None) for v in views
-        ]
-        after = [score(v.reference, v.registered, v.inside) for v in views]
-        found[name] = float(np.mean(before)), float(np.mean(after))
-    return found
-
-
-def patches(views: list[View], image: str = "registered") -> np.ndarray:
-    """Lengths of the patch residual over all views [px]."""
-    return np.concatenate(
-        [metrics.patch_residual(v.reference, getattr(v, image), v.inside).norms for v in views]
-    )
+            source = self.source(name)
+            registered, mask = registrar.register(source, depth(name))
+            inside = cv2.erode((mask == 0).astype(np.uint8), EROSION)
+            yield View(self.reference(name), cv2.resize(source, SIZE), registered, inside)

@@ -1,17 +1,21 @@
-"""The published benchmarks, one after the other: printed, and kept in bench/results.
+"""The benchmarks, one after the other: printed, and kept in bench/results.
 
-run.py            those that say how fast, and how good, in some 15 minutes on two cores
-run.py --all      the long ones too
-run.py NAME ...   these
-run.py --docs     writes the tables of docs/performance.md and its picture from what was found
-run.py --docs-only [results.json]    writes them from results kept before
+run.py                     those that docs/performance.md publishes, in some 15 minutes on two cores
+run.py --all               the others too, in more than an hour
+run.py NAME ...            these
+run.py NAME -- OPTION ...  one of them with options of its own (NAME -- --help); nothing is kept
+run.py --list              their names, and what each measures
+run.py --docs              then writes the tables of docs/performance.md and its picture
+run.py --docs-only         writes them from what is kept
+
+Of each benchmark the newest run is kept, with its commit, its date and the machine; a run that
+fails, or that skips everything, replaces nothing.
 """
 
 import argparse
 import json
 import os
 import platform
-import re
 import subprocess
 import sys
 import tempfile
@@ -20,51 +24,44 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import roofline
-from common import ROOT, cpu_model
+import pages
+from common import ROOT, cpu, git, summary
 from figures import KEPT_IN
+from speed import kernels
 
 BENCH = ROOT / "bench"
-RESULTS = BENCH / "results"
+KEPT = BENCH / "results" / "latest.json"
 DOCS = ROOT / "docs" / "performance.md"
 ROOFLINE = ROOT / "docs" / "images" / "roofline.svg"
-KERNELS = ROOT / "build" / "bench" / "cpp" / "bench" / "cpp" / "xcalib_bench"
-
-SHORT = ("kernels", "register_frame", "calibration_time", "night_rig", "flir_rig", "depth_measured")
-LONG = (
-    "synthetic_rigs",
-    "depth_completion",
-    "depth_conditioning",
-    "depth_sources",
-    "patch_flow",
-    "flow_term",
-    "frame_choice",
-    "clock_offset",
-)
-FIGURES_OF = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 PACKAGES = ("numpy", "opencv-python-headless", "onnxruntime", "scipy", "torch", "matplotlib")
 
 
-def git(*arguments: str) -> str:
-    command = ["git", "-C", str(ROOT), *arguments]
-    return subprocess.run(command, capture_output=True, text=True).stdout.strip()
+def scripts(folder: str, *names: str) -> dict[str, Path]:
+    return {name: BENCH / folder / f"{name}.py" for name in names}
+
+
+# What each measures is the first line of its docstring. bench/experiments has a list of its own.
+PUBLISHED = (  # each has its table in docs/performance.md
+    scripts("speed", "kernels", "register_frame", "calibration_time")
+    | scripts("accuracy", "night_rig", "flir_rig", "depth_measured")
+)
+OTHERS = scripts("speed", "stream") | scripts(
+    "accuracy",
+    *("synthetic_rigs", "depth_sources", "depth_completion", "depth_conditioning", "patch_flow"),
+    *("flow_term", "frame_choice", "clock_offset"),
+)
+ALL = PUBLISHED | OTHERS
 
 
 def commit() -> str:
     """Short hash; -dirty where something that is measured differs from it."""
-    measured = ["cpp", "python", "bench/*.py", "bench/*/*.py", "bench/cpp", "CMakeLists.txt"]
+    measured = ["cpp", "python", "bench", ":!bench/results", "CMakeLists.txt"]
     changed = git("status", "--porcelain", "--", *measured)
     return (git("rev-parse", "--short", "HEAD") or "unknown") + ("-dirty" if changed else "")
 
 
-def machine() -> dict[str, Any]:
-    found: dict[str, Any] = {
-        "cpu": cpu_model(),
-        "cores": os.cpu_count(),
-        "system": platform.platform(),
-        "python": platform.python_version(),
-        "load_average": list(os.getloadavg()),
-    }
+def software() -> dict[str, str]:
+    found = {"system": platform.platform(), "python": platform.python_version()}
     for package in PACKAGES:
         try:
             found[package] = version(package)
@@ -76,53 +73,39 @@ def machine() -> dict[str, Any]:
 # -- Running -------------------------------------------------------------------------------------
 
 
-def run_script(name: str, arguments: list[str]) -> tuple[list[dict[str, Any]], bool]:
-    """Its figures, and whether it came to its end."""
+def run(name: str, options: list[str]) -> tuple[dict[str, Any], bool]:
+    """What is kept of it, and whether it came to its end."""
+    print(f"== {name}: {summary(ALL[name])}", flush=True)
+    record: dict[str, Any] = {
+        "commit": commit(),
+        "date": time.strftime("%Y-%m-%d %H:%M", time.gmtime()) + " UTC",
+        "cpu": cpu(),
+        "load_average": list(os.getloadavg()),
+        "software": software(),
+    }
+    start = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         kept = Path(folder) / "figures"
         kept.touch()
         done = subprocess.run(
-            [sys.executable, str(BENCH / f"{name}.py"), *arguments],
-            env=os.environ | {KEPT_IN: str(kept)},
+            [sys.executable, str(ALL[name]), *options],
+            env=os.environ | {KEPT_IN: str(kept), "PYTHONPATH": str(BENCH)},
         )
-        return [json.loads(line) for line in kept.read_text().splitlines()], done.returncode == 0
+        lines = [json.loads(line) for line in kept.read_text().splitlines()]
+    record["seconds"] = round(time.perf_counter() - start, 1)
+    record["figures"] = [line for line in lines if "details" not in line]
+    for line in lines:
+        if "details" in line:
+            record["details"] = line["details"]
+    return record, done.returncode == 0
 
 
-def run_kernels(found: dict[str, Any]) -> tuple[list[dict[str, Any]], bool]:
-    """The C++ ones, whose own JSON is kept whole; what they know of the machine goes with it."""
-    if not KERNELS.is_file():
-        reason = "not built (make bench builds it)"
-        print(f"skipped: kernels: {reason}")
-        return [{"name": "kernels", "skipped": reason}], True
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "kernels.json"
-        done = subprocess.run(
-            [
-                *(str(KERNELS), f"--benchmark_out={out}", "--benchmark_out_format=json"),
-                *("--benchmark_repetitions=7", "--benchmark_min_time=0.15"),
-                "--benchmark_enable_random_interleaving=true",
-                "--benchmark_display_aggregates_only=true",
-            ]
-        )
-        if done.returncode != 0:
-            return [], False
-        found["kernels"] = json.loads(out.read_text())
-    context = found["kernels"]["context"]
-    for private in ("executable", "host_name"):
-        del context[private]
-    wanted = ("highway_target", "compiler", "Ceres", "Eigen", "OpenCV")
-    found["machine"] |= {key: context[key] for key in wanted}
-    return roofline.figures_of(found["kernels"]), True
+def measured(record: dict[str, Any]) -> bool:
+    """Not where all was skipped, for want of data or of a build: what was kept before stays."""
+    return "details" in record or any("value" in figure for figure in record["figures"])
 
 
 # -- Writing -------------------------------------------------------------------------------------
-
-
-def write_whole(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(text)
-    beside.replace(path)
 
 
 def number(value: float) -> str:
@@ -130,103 +113,102 @@ def number(value: float) -> str:
 
 
 def table(figures: list[dict[str, Any]]) -> str:
-    lines = ["| figure | median | 10-90 % | target |", "|---|---|---|---|"]
+    rows = []
     for f in figures:
         if "skipped" in f:
-            lines.append(f"| {f['name']} | skipped: {f['skipped']} | | |")
+            rows.append([f["name"], f"skipped: {f['skipped']}", "", ""])
             continue
         spread = f"{number(f['low'])} - {number(f['high'])}" if "low" in f else ""
         target = f"{f['target']}: {'met' if f['met'] else '**not met**'}" if "target" in f else ""
-        value = f"{number(f['value'])} {f['unit']}".strip()
-        lines.append(f"| {f['name']} | {value} | {spread} | {target} |")
-    return "\n".join(lines) + "\n"
+        rows.append([f["name"], f"{number(f['value'])} {f['unit']}".strip(), spread, target])
+    return pages.table(["figure", "median", "10-90 %", "target"], rows)
 
 
-def machine_text(found: dict[str, Any]) -> str:
-    load = ", ".join(f"{value:.1f}" for value in found["machine"]["load_average"])
-    rest = [
-        f"{key} {value}"
-        for key, value in found["machine"].items()
-        if key not in ("cpu", "cores", "load_average")
-    ]
-    return (
-        f"Commit {found['commit']}, {found['date']}. {found['machine']['cpu']}, "
-        f"{found['machine']['cores']} cores, load average at the start {load}. {', '.join(rest)}.\n"
+def section(name: str, record: dict[str, Any]) -> str:
+    """When and where it ran, and its table."""
+    load = ", ".join(f"{value:.1f}" for value in record["load_average"])
+    whence = (
+        f"Commit {record['commit']}, {record['date']}, {record['cpu']}, load average at the start"
+        f" {load}."
     )
+    own = kernels.table(record["details"]) if name == "kernels" else table(record["figures"])
+    return f"\n{whence}\n\n{own}\n"
 
 
-def markdown(found: dict[str, Any]) -> str:
-    parts = [f"# Benchmarks of {found['commit']}\n\n{machine_text(found)}"]
-    parts += [f"\n## {name}\n\n{table(figures)}" for name, figures in found["figures"].items()]
-    return "".join(parts)
+def software_text(records: dict[str, Any]) -> str:
+    """What the benchmarks ran with, a line for those that ran with the same."""
+    alike: dict[str, list[str]] = {}
+    for name, record in records.items():
+        found = record["software"] | record.get("details", {}).get("software", {})
+        alike.setdefault(", ".join(f"{k} {v}" for k, v in found.items()), []).append(name)
+    return "\n".join(f"- {', '.join(names)}: {text}." for text, names in alike.items()) + "\n"
 
 
-def write_docs(found: dict[str, Any]) -> None:
-    """Between the markers of docs/performance.md; what was not run stays as it is."""
+def markdown(records: dict[str, Any]) -> str:
+    parts = [f"# The newest run of each benchmark\n\n{software_text(records)}"]
+    for name, script in ALL.items():
+        if name in records:
+            parts.append(f"\n## {name}\n\n{summary(script)}\n{section(name, records[name])}")
+    return "".join(parts).rstrip("\n") + "\n"
 
-    def fill(match: re.Match[str]) -> str:
-        name = match[2]
-        if name == "machine":
-            body = "\n" + machine_text(found) + "\n"
-        elif name == "kernels" and "kernels" in found:
-            body = "\n" + roofline.table(found["kernels"]) + "\n"
-        elif name in found["figures"]:
-            body = "\n" + table(found["figures"][name]) + "\n"
-        else:
-            return match[0]
-        return match[1] + body + match[3]
 
-    write_whole(DOCS, FIGURES_OF.sub(fill, DOCS.read_text()))
-    if "kernels" in found:
-        roofline.draw(found["kernels"], found["machine"], ROOFLINE)
+def write_docs(records: dict[str, Any]) -> None:
+    """Between the markers of docs/performance.md; what was never run stays as it is."""
+    published = {name: records[name] for name in PUBLISHED if name in records}
+    for name, record in published.items():
+        pages.replace_marked(DOCS, name, section(name, record))
+    pages.replace_marked(DOCS, "software", f"\n{software_text(published)}\n")
+    if "kernels" in records:
+        kernels.draw(records["kernels"]["details"], records["kernels"]["cpu"], ROOFLINE)
+
+
+def listing() -> str:
+    lines = []
+    for title, some in (("published:", PUBLISHED), ("others:", OTHERS)):
+        lines += [title, *(f"  {name:<18}  {summary(script)}" for name, script in some.items())]
+    return "\n".join([*lines, "experiments of docs/results.md: python bench/experiments --help"])
 
 
 def main() -> int:
+    given = sys.argv[1:]
+    split = given.index("--") if "--" in given else len(given)
+    given, options = given[:split], given[split + 1 :]
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--all", action="store_true")
+    parser.add_argument("--list", action="store_true")
     parser.add_argument("--docs", action="store_true")
-    parser.add_argument("--docs-only", nargs="?", const="", metavar="RESULTS")
-    parser.add_argument("--rounds", type=int, default=2, help="of calibration_time")
-    args = parser.parse_args()
-    if unknown := set(args.names) - {*SHORT, *LONG}:
-        parser.error(f"no benchmark {sorted(unknown)}, expected some of {[*SHORT, *LONG]}")
-    if args.docs_only is not None:
-        kept = Path(args.docs_only or RESULTS / f"{commit()}.json")
-        if not kept.is_file():
-            parser.error(f"no results in {kept}")
-        write_docs(json.loads(kept.read_text()))
+    parser.add_argument("--docs-only", action="store_true")
+    args = parser.parse_args(given)
+    if unknown := set(args.names) - set(ALL):
+        parser.error(f"no benchmark {', '.join(sorted(unknown))}, expected some of\n{listing()}")
+    if options and len(args.names) != 1:
+        parser.error(f"{len(args.names)} names before --, expected the one that takes the options")
+    if args.list:
+        print(listing())
         return 0
-    found: dict[str, Any] = {
-        "commit": commit(),
-        "date": time.strftime("%Y-%m-%d %H:%M", time.gmtime()) + " UTC",
-        "machine": machine(),
-        "figures": {},
-        "seconds": {},
-    }
-    kept = RESULTS / f"{found['commit']}.json"
-    if args.names and kept.is_file() and not found["commit"].endswith("-dirty"):
-        before = json.loads(kept.read_text())
-        found = before | found | {key: before[key] for key in ("figures", "seconds")}
-        found["machine"] = before["machine"] | found["machine"]
-    failed = []
-    for name in args.names or (SHORT + LONG if args.all else SHORT):
-        print(f"== {name}", flush=True)
-        start = time.perf_counter()
-        options = ["--rounds", str(args.rounds)] if name == "calibration_time" else []
-        figures, whole = run_kernels(found) if name == "kernels" else run_script(name, options)
+    if options:
+        return 0 if run(args.names[0], options)[1] else 1
+    records = json.loads(KEPT.read_text()) if KEPT.is_file() else {}
+    if args.docs_only:
+        write_docs(records)
+        return 0
+    failed, kept = [], []
+    for name in args.names or (ALL if args.all else PUBLISHED):
+        record, whole = run(name, [])
         if not whole:
             failed.append(name)
-        found["figures"][name] = figures
-        found["seconds"][name] = round(time.perf_counter() - start, 1)
-        write_whole(kept, json.dumps(found, indent=1) + "\n")  # so far
-    print(machine_text(found))
-    write_whole(kept.with_suffix(".md"), markdown(found))
-    print(f"kept in {kept.relative_to(ROOT)} and .md")
+        if not whole or not measured(record):
+            continue
+        records[name] = record
+        kept.append(name)
+        pages.write_whole(KEPT, json.dumps(records, indent=1) + "\n")  # so far
+        pages.write_whole(KEPT.with_suffix(".md"), markdown(records))
+    print(f"kept in {KEPT.relative_to(ROOT)} and .md: {', '.join(kept) or 'nothing new'}")
     if args.docs:
-        write_docs(found)
+        write_docs(records)
     if failed:
         print(f"error: {', '.join(failed)} failed", file=sys.stderr)
     return 1 if failed else 0

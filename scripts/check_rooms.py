@@ -3,7 +3,8 @@
 Each folder of ``cpp/src`` is a room and includes only rooms above it in ``ROOMS``; depth, judge and
 footage do not include each other. A public header belongs to the room that has its source. No file
 includes itself through others, Ceres stays in ``solve``, and nothing that `xcalib::register`
-installs leads to a solver's header.
+installs leads to a solver's header. Only ``geometry`` reads the coefficients of a camera, and what
+prints, parses or parameterizes one: how a camera projects is written in one place.
 """
 
 import re
@@ -36,6 +37,22 @@ HEADERS_ONLY = {
     "xcalib_rig_file.h": "rig_file",
 }
 UMBRELLA = "xcalib.hpp"
+# Who reads a coefficient of a camera, by the path within cpp/ or its beginning.
+READERS = (
+    "src/geometry/",
+    # parameterize
+    "src/objective/paper_variables.cpp",
+    "src/objective/parameters.cpp",
+    "src/objective/projection_derivative.hpp",
+    # print and parse
+    "cli/inspect_command.cpp",
+    "python/bindings",
+    "src/footage/fingerprint.cpp",
+    "src/judge/describe.cpp",
+    "src/register/c_api.cpp",
+    "src/rig_file/",
+)
+COEFFICIENT = re.compile(r"(?:\.|->)(?:fx|fy|cx|cy|skew)\b")
 REGISTER = ROOMS[: ROOMS.index("register") + 1]
 
 
@@ -90,6 +107,17 @@ def breaches(root: Path) -> list[str]:
                 found.append(f"{name}: {room} includes {other} of {below}, which stands below it")
             elif below != room and {below, room} <= APART:
                 found.append(f"{name}: {room} includes {other} of {below}: these stand apart")
+    cpp = root / "cpp"
+    for path in sorted(cpp.rglob("*.?pp")):
+        within = str(path.relative_to(cpp))
+        if within.startswith(READERS):
+            continue
+        found += [
+            f"cpp/{within}:{number}: reads a coefficient of a camera ({read.group()}): what is"
+            " asked for belongs in cpp/src/geometry"
+            for number, line in enumerate(path.read_text().splitlines(), 1)
+            if (read := COEFFICIENT.search(line))
+        ]
     try:
         order = list(TopologicalSorter(graph).static_order())
     except CycleError as error:

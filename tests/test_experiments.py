@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -33,6 +34,7 @@ def run(folder: Path, *arguments: str) -> str:
     ("arguments", "table"),
     [
         (["3", "--part", "rendered"], "3_rendered"),
+        (["4"], "4_scales"),
         (["6"], "6_depth"),
     ],
 )
@@ -56,19 +58,16 @@ def test_metrics_by_shift(tmp_path: Path, xcalib_data: Path) -> None:
     assert (tmp_path / "1_metrics.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_every_table_has_its_place_in_the_docs() -> None:
-    """The names that the scripts give their tables, and the markers, are the same."""
-    import re
+def test_every_table_has_its_place_in_the_docs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table that is not among an experiment's own is refused when it is written."""
+    for folder in (BENCH.parent, BENCH):
+        monkeypatch.syspath_prepend(str(folder))
+    import pages
+    from results import DOCS, Results
 
-    page = (BENCH.parents[1] / "docs" / "results.md").read_text()
-    marked = set(re.findall(r"<!-- (\w+) -->", page))
-    assert {f"<!-- /{name} -->" in page for name in marked} == {True}
-    modules = dict(re.findall(r'"(\w+)": "(\w+)"', (BENCH / "__main__.py").read_text()))
-    assert len(modules) == 11
-    named = set()
-    for experiment, module in modules.items():
-        text = (BENCH / f"{module}.py").read_text()
-        names = re.findall(r"(?:results\.table|night_table)\(\s*(?:results,\s*)?\"(\w+)\"", text)
-        assert names, module
-        named |= {f"{experiment}_{name}" for name in names}
-    assert named == marked
+    experiments = runpy.run_path(str(BENCH / "__main__.py"))["EXPERIMENTS"]
+    marked = pages.marked(DOCS)
+    assert marked == {f"{e}_{name}" for e, (_, names) in experiments.items() for name in names}
+    assert all(f"<!-- /{name} -->" in DOCS.read_text() for name in marked)
+    with pytest.raises(ValueError, match="table other of experiment 1"):
+        Results(Path(), "1", ["metrics"], quick=True).table("other", [], [], "")

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-from conftest import FRAMES, Process, run
+from conftest import FRAMES, WIDTH, Process, run
 from xcalib import Rig
 from xcalib.cli import cli as python_command
 from xcalib.depth import read_depth
@@ -109,14 +109,12 @@ def test_calibrate_with_what_needs_preparing(
     assert first.stderr == second.stderr
     assert "false colour (map: inferno)" in first.stderr
     assert "1 unusable frame is left out" in first.stderr
-    ours, theirs = (json.loads((tmp_path / f"{name}.json").read_text()) for name in "cp")
-    assert list(ours) == list(theirs)
-    assert ours["files"] == theirs["files"]
-    for document in (ours, theirs):
-        for level in (document, *document["levels"]):
-            del level["seconds"]
-        del document["rig"], document["time"]
-    assert ours == theirs
+    ours, theirs = ((tmp_path / f"{name}.json").read_text() for name in "cp")
+    assert json.loads(ours)["files"] == json.loads(theirs)["files"]
+    times = "|".join(["seconds", *json.loads(ours)["time"]])
+    different = re.compile(rf'"(rig|{times})": .*')
+    assert len(different.findall(ours)) > len(json.loads(ours)["levels"])
+    assert different.sub("", ours) == different.sub("", theirs)
     assert run("report", tmp_path / "c.json").exit_code == 0
 
 
@@ -286,8 +284,8 @@ def test_evaluate_gives_the_same_scores(
     first, second = both(*arguments, "--json", tmp_path / "OUT.json")
     assert first.stdout == second.stdout
     assert "patch median" in first.stdout
-    ours, theirs = (json.loads((tmp_path / f"{name}.json").read_text()) for name in "cp")
-    assert ours == theirs
+    assert (tmp_path / "c.json").read_bytes() == (tmp_path / "p.json").read_bytes()
+    assert json.loads((tmp_path / "c.json").read_text())["registered"]["nec"] > 0
 
 
 def test_inspect_prints_the_same(
@@ -296,7 +294,8 @@ def test_inspect_prints_the_same(
     first, second = both("inspect", rendered / "rig.yaml")
     assert first.stdout == second.stdout
     first, second = both("inspect", rendered / "rig.yaml", "--json")
-    assert json.loads(first.stdout) == json.loads(second.stdout)
+    assert first.stdout == second.stdout
+    assert json.loads(first.stdout)["reference"]["width"] == WIDTH
 
 
 def test_bench_times_frames(cli: Callable[..., Process], rendered: Path) -> None:

@@ -1,6 +1,6 @@
-// The kernels by themselves, one thread each, beside a plain copy of as many bytes and the
-// machine's multiply-adds. Bytes are those that a kernel has to read and to write at least: each
-// input and each output once. Of a copy they are what it reads and what it writes, too.
+// Each kernel alone, one thread, beside a plain copy of as many bytes and the machine's
+// multiply-adds. Bytes are those that a kernel must read and write at least: each input and each
+// output once. A copy's bytes, too, are what it reads and what it writes.
 #include <benchmark/benchmark.h>
 #include <ceres/version.h>
 
@@ -27,7 +27,7 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
-// Sizes of kernels' traffic: each has its copy.
+// Bytes of the kernels: a copy of as many is measured for each.
 std::set<std::size_t> copy_sizes;
 
 struct Work {
@@ -35,7 +35,7 @@ struct Work {
     double pixels = 0;  // of the reference, of one call
     double bytes = 0;   // of one call
     std::function<void()> call;
-    std::function<double()> edge_share = nullptr;  // of the pixels, that the source has an edge at
+    std::function<double()> edge_share = nullptr;  // share of pixels where the source has an edge
 };
 
 void add(const Work& work) {
@@ -50,7 +50,7 @@ void add(const Work& work) {
     })->Unit(benchmark::kMillisecond);
 }
 
-// -- What they look at ---------------------------------------------------------------------------
+// -- Images and rigs -----------------------------------------------------------------------------
 
 // Overlapping rectangles, as in a street, blurred a little and with noise.
 Image town(unsigned seed, int width, int height) {
@@ -100,7 +100,7 @@ const char* type_name(PixelType type) {
     return type == PixelType::u8 ? "u8" : type == PixelType::u16 ? "u16" : "f32";
 }
 
-// One frame of a stream: `samples` are random, since their values do not matter.
+// One frame of a stream. The source is random: its values do not matter.
 void add_register(PixelType type, int channels, Occlusion occlusion) {
     constexpr int kWidth = 1280, kHeight = 960, kSourceWidth = 640, kSourceHeight = 512;
     struct Stream {
@@ -149,7 +149,7 @@ void add_nec() {
     // Depth, and the reference's edges in x and y; the source.
     const double bytes = 12 * kPixels + 4 * kSourcePixels;
     const auto edge_share = [=] {
-        const auto rows = nec_rows(*frame, rig, kNumWithoutReference).residuals.size();
+        const auto rows = nec_rows(*frame, rig, Parameters(kNumWithoutReference)).residuals.size();
         return static_cast<double>(rows - 1) / 2 / kPixels;
     };
     add({"nec/value", kPixels, bytes,
@@ -157,7 +157,8 @@ void add_nec() {
     for (const int count : {int{kNumWithoutReference}, int{kNumParameters}})
         add({"nec/normal_equations/" + std::to_string(count), kPixels, bytes,
              [=] {
-                 benchmark::DoNotOptimize(nec_normal_equations(*frame, rig, count).gradient.sum());
+                 benchmark::DoNotOptimize(
+                     nec_normal_equations(*frame, rig, Parameters(count)).gradient.sum());
              },
              edge_share});
 }

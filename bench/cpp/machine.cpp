@@ -26,8 +26,8 @@ void copy_floats(const float* HWY_RESTRICT from, float* HWY_RESTRICT to, std::si
 
 float chains(std::size_t rounds) {
     const hn::ScalableTag<float> d;
-    // Towards 1, and never there: the numbers stay ordinary. Each chain has its own start, so that
-    // none is another's copy.
+    // The values tend to 1 and stay normal numbers. Each chain has its own start, so that the
+    // compiler cannot merge two.
     const auto factor = hn::Set(d, 0.999f), term = hn::Set(d, 0.001f);
     auto a = hn::Iota(d, 0.0f), b = hn::Iota(d, 1.0f), c = hn::Iota(d, 2.0f);
     auto e = hn::Iota(d, 3.0f), f = hn::Iota(d, 4.0f), g = hn::Iota(d, 5.0f);

@@ -1,4 +1,4 @@
-// What the machine can do at most, by one thread, and what the library makes of it.
+// What one thread of this machine can do at most, and the instruction set that the library uses.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@ const char* highway_target();
 // Copies `count` floats, by plain vector loads and stores.
 void copy(const float* from, float* to, std::size_t count);
 
-// Multiplies and adds, in as many independent chains as hide their latency; returns what they came
-// to. `flops_per_round` is what one of `rounds` is worth.
+// Multiplies and adds, in as many independent chains as hide their latency; returns the sum of
+// their results. One of `rounds` is `flops_per_round` floating-point operations.
 float multiply_add(std::size_t rounds);
 double flops_per_round();
 

@@ -1,7 +1,6 @@
 """The paper's experiments on data at hand, and three more: one command each.
 
-    python bench/experiments 1            # 1 to 9, "rest" (what is left of the residual),
-                                          # "refine" (each frame anew), or "all"
+    python bench/experiments 3            # one of those below, or all
     python bench/experiments 3 --quick    # seconds, on next to nothing: only to see that it runs
 
 Tables (Markdown, CSV) and plots go to a results folder; a full run also rewrites its tables between
@@ -16,27 +15,36 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from common import ROOT, machine
+from common import ROOT, machine, summary
 from results import Results
 
-EXPERIMENTS = {
-    "1": "metrics_by_shift",
-    "2": "consistency",
-    "3": "comparison",
-    "4": "translation_scales",
-    "5": "ablation",
-    "6": "depth_errors",
-    "7": "basin",
-    "8": "few_frames",
-    "9": "nominal",
-    "rest": "rest",
-    "refine": "refinement",
+EXPERIMENTS = {  # module, and the tables that it writes
+    "1": ("metrics_by_shift", ["metrics"]),
+    "2": ("consistency", ["consistency"]),
+    "3": ("comparison", ["night", "folds", "rendered"]),
+    "4": ("translation_scales", ["scales"]),
+    "5": ("ablation", ["night", "rendered"]),
+    "6": ("depth_errors", ["depth"]),
+    "7": ("basin", ["displacement", "limits", "frames"]),
+    "8": ("few_frames", ["night", "rendered"]),
+    "9": ("nominal", ["nominal"]),
+    "rest": ("rest", ["corrections", "neighbours", "where"]),
+    "refine": ("refinement", ["night", "known"]),
 }
+
+
+def listing() -> str:
+    folder = Path(__file__).parent
+    return "\n".join(
+        f"  {name:<6}  {summary(folder / f'{module}.py')}"
+        for name, (module, _) in EXPERIMENTS.items()
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=f"{__doc__}\n{listing()}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("experiment", choices=[*EXPERIMENTS, "all"])
     parser.add_argument(
@@ -50,8 +58,9 @@ def main() -> None:
     for name in EXPERIMENTS if args.experiment == "all" else [args.experiment]:
         start = time.perf_counter()
         deadline = start + 60 * args.minutes if args.minutes else float("inf")
-        results = Results(args.results, name, args.quick, deadline)
-        importlib.import_module(EXPERIMENTS[name]).run(results, args.part)
+        module, tables = EXPERIMENTS[name]
+        results = Results(args.results, name, tables, args.quick, deadline)
+        importlib.import_module(module).run(results, args.part)
         print(f"{time.perf_counter() - start:.0f} s, results in {args.results}")
 
 

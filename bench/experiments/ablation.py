@@ -1,11 +1,14 @@
-"""Experiment 5: each part of the method off in turn. Parts: `night`, `rendered`."""
+"""Each part of the method off in turn. Parts: `night`, `rendered`."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from footage import NEAR, Night, mapped, random_rigs
-from judge import gain, judge, systematic
+from judge import counted_map, gain, judge, patch_cells, systematic
+from night import SIZE, NightRig
+from rendered import NEAR, random_rigs
 from results import Results
 
 import xcalib
@@ -22,10 +25,11 @@ class Variant:
     off: tuple[str, ...] = ()
     masked: bool = True  # occluded pixels are not judged
 
-    def made(self) -> xcalib.CalibrationOptions:
+    def fit(self, calibrate: Callable, *where) -> xcalib.CalibrationResult:
+        """By `NightRig.fit` or `Rendered.calibrate`."""
+        parts = _core._Parts(**dict.fromkeys(self.off, False))
         options = xcalib.CalibrationOptions(**self.options)
-        options._parts = _core._Parts(**dict.fromkeys(self.off, False))
-        return options
+        return calibrate(*where, options=options, how=partial(_core._calibrate, parts))
 
 
 VARIANTS = {
@@ -46,36 +50,30 @@ VARIANTS = {
 
 
 def night_part(results: Results) -> None:
-    night = Night.open()
+    night = NightRig.open()
     if night is None:
         return
     fit, held = night.fold(4)
     fit, held = results.of((fit, held), (fit[:3], held[:1]))
-
-    def depth(name: str) -> np.ndarray:
-        return night.rig.depth("depth_filled", name)
-
     rows = []
     for label, variant in results.in_time(list(VARIANTS.items())[: results.of(None, 1)]):
         start = time.perf_counter()
-        result = night.calibrate(fit, depth, variant.made())
+        result = variant.fit(night.fit, night.filled, fit)
         seconds = time.perf_counter() - start
         registrar = night.registrar(result.rig)
         judged = []
         for name in held:
             source = night.source(name)
-            at, counts = mapped(registrar, source, depth(name))
+            at, counts = counted_map(registrar, source, night.filled(name))
             mask = counts if variant.masked else None
             judged.append(judge(night.reference(name), source, at, mask))
-        norms = np.concatenate([j.patches.norms for j in judged])
         rows.append(
             [
                 label,
                 f"{gain(judged, 'NEC'):+.1%}",
                 f"{gain(judged, 'GC'):+.0%}",
-                f"{np.median(norms):.2f}" if len(norms) else "-",
-                f"{np.mean(norms < 2):.0%}" if len(norms) else "-",
-                f"{systematic([j.patches for j in judged], night.size):.2f}",
+                *patch_cells(judged),
+                f"{systematic([j.patches for j in judged], SIZE):.2f}",
                 f"{result.rig.t[0]:+.3f}",
                 "yes" if result.converged else "no",
                 f"{seconds:.0f}",
@@ -100,22 +98,21 @@ def rendered_part(results: Results) -> None:
     trusted = {label: {"any": [], "near": []} for label in variants}
     seconds = {label: [] for label in variants}
     count = results.of(15, 1)
-    # By turns, so that both kinds are alike in number whenever time is up.
+    # In turns, so that there are as many of both kinds whenever time is up.
     turns = zip(*(random_rigs(count, frames, results.quick, **k) for k in ({}, NEAR)), strict=True)
     for scenes in results.in_time(turns):
         for name, scene in zip(("any", "near"), scenes, strict=True):
             for label, variant in variants.items():
                 start = time.perf_counter()
                 try:
-                    result = scene.calibrate(variant.made())
+                    result = variant.fit(scene.calibrate)
                     error, converged = scene.error(result.rig), result.converged
                 except RuntimeError:  # nothing overlaps: as far from a rig as can be
                     error, converged = np.inf, False
                 seconds[label].append(time.perf_counter() - start)
                 errors[label][name].append(error)
                 trusted[label][name].append(converged)
-            told = [f"{errors[k][name][-1]:.2f}" for k in variants]
-            print(name, *told, flush=True)
+            print(name, *(f"{errors[k][name][-1]:.2f}" for k in variants), flush=True)
     rows = []
     for label in variants:
         near, far = (np.array(errors[label][name]) for name in ("near", "any"))

@@ -1,4 +1,4 @@
-"""Experiment 7: from how far off is a rig found? Beside ECC and MI a pair, and the paper's Adam.
+"""From how far off is a rig found? Beside ECC and MI on each pair, and the paper's Adam.
 
 Parts: `displacement` (ratio of fields of view by displacement), `limits` (the same for ours alone,
 farther), `frames` (frames by roll).
@@ -6,22 +6,22 @@ farther), `frames` (frames by roll).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import islice, product
+from itertools import product
 
 import cv2
 import numpy as np
 from baselines import NotFound, homographies, mutual_information
-from footage import HEIGHT, SOURCE_HEIGHT, SOURCE_WIDTH, WIDTH, Rendered, rendered
+from rendered import HEIGHT, SOURCE_HEIGHT, SOURCE_WIDTH, WIDTH, Rendered, rendered
 from results import Results
 
 import xcalib
 
 LIMIT = 2.0
-"""Median end-point error of what counts as found [px]: a homography may."""
+"""A rig counts as found below this median end-point error [px]; a homography can get there."""
 BASELINE = 0.1  # [m]
 
 Method = Callable[[Rendered, int], float]
-"""Median end-point error [px], of what may use the first so many frames of a scene."""
+"""Median end-point error [px] of a method that may use so many frames of a scene, the first."""
 
 
 def rig_of(ratio: float, shift: float, roll_deg: float, angle: float) -> xcalib.Rig:
@@ -41,11 +41,9 @@ def a_pair(method: Callable) -> Method:
     def error(scene: Rendered, count: int) -> float:
         errors = []
         true = xcalib.Registrar(scene.rig, occlusion="ignore")
-        frames = zip(scene.references, scene.sources, scene.depths, strict=True)
-        for reference, source, depth in islice(frames, count):
-            images = reference.mean(axis=2).astype(np.float32) / 255, source / np.float32(255)
+        for reference, source, depth in scene.gray_frames(slice(0, count)):
             try:
-                found = np.linalg.norm(method(*images) - true.map(depth), axis=-1)
+                found = np.linalg.norm(method(reference, source) - true.map(depth), axis=-1)
                 errors.append(np.nanmedian(found))
             except NotFound:
                 errors.append(np.inf)
@@ -88,7 +86,7 @@ ROLLS, FRAMES = (0.0, 5.0, 10.0, 20.0), (1, 2, 4, 8)
 
 @dataclass(frozen=True)
 class Grid:
-    """What is tried, and how it is called: a value of each row and one of each column."""
+    """What is tried: a value for each row and one for each column, and their labels."""
 
     rows: tuple[float, ...]
     row_label: str
@@ -112,8 +110,8 @@ class Grid:
             for label, error in methods.items():
                 found[label][i, j] += error(scene, count) < LIMIT
             done[i, j] += 1
-            told = (f"{v[i, j]:.0f}" for v in found.values())
-            print(seed, self.rows[i], self.columns[j], *told, "of", done[i, j], flush=True)
+            counts = (f"{v[i, j]:.0f}" for v in found.values())
+            print(seed, self.rows[i], self.columns[j], *counts, "of", done[i, j], flush=True)
         if not done.all():
             raise SystemExit("time was up before every cell had a rig; expected more --minutes")
         rigs = " to ".join(str(n) for n in sorted({done.min(), done.max()}))

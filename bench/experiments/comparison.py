@@ -1,7 +1,7 @@
-"""Experiment 3: ours beside what registers pairs without a rig, and beside the paper's solver.
+"""Ours beside what registers pairs without a rig, and beside the paper's solver.
 
 Parts: `night`, the night rig in five folds of 8 frames, fitted on the other 32 (the fifth is the
-split of `bench/night_rig.py`); `rendered`, rigs with truth.
+split of `bench/accuracy/night_rig.py`); `rendered`, rigs with truth.
 """
 
 import time
@@ -11,14 +11,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from baselines import NotFound, dense, homographies, mutual_information, unregistered
 from baselines.phase_congruency import rift
-from footage import NEAR, Night, mapped, random_rigs
-from judge import SCORE_COLUMNS, Judged, judge, scores
+from judge import SCORE_COLUMNS, Judged, counted_map, judge, score_cells
+from night import SIZE, NightRig
+from rendered import NEAR, random_rigs
 from results import Results
 
 import xcalib
-from xcalib._core import fit_plane, frames_to_judge_plane
-from xcalib.depth import PlaneDepth
-from xcalib.depth.completion import MIN_CONFIDENCE, complete
 
 PAIRWISE: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "unregistered": unregistered,
@@ -55,7 +53,7 @@ class Row:
         if self.fits:
             fits += f" ({self.trusted} of {len(self.fits)} trusted)"
         per_pair = f"{np.median(self.seconds):.3f}"
-        return [*scores(self.judged, size), per_pair, fits, f"{self.failures}"]
+        return [*score_cells(self.judged, size), per_pair, fits, f"{self.failures}"]
 
 
 COLUMNS = [*SCORE_COLUMNS, "s a pair", "calibration", "not found"]
@@ -73,51 +71,11 @@ def pairwise(row: Row, method, reference, source, truth=None, scale=1.0) -> None
     row.judged.append(judge(reference, source, at, truth=truth, scale=scale))
 
 
-class Sources:
-    """Depth of the night rig by source: `sources[label](name)`."""
-
-    def __init__(self, night: Night) -> None:
-        self.night = night
-        self.completed: dict[str, np.ndarray] = {}
-        self.planes: dict[int, PlaneDepth] = {}
-
-    def filled(self, name: str) -> np.ndarray:
-        return self.night.rig.depth("depth_filled", name)
-
-    def semi_dense(self, name: str) -> np.ndarray:
-        return self.night.rig.depth("depth", name)
-
-    def completion(self, name: str) -> np.ndarray:
-        if name not in self.completed:
-            dense_depth, confidence = complete(self.semi_dense(name), self.night.rig.visible(name))
-            self.completed[name] = np.where(confidence >= MIN_CONFIDENCE, dense_depth, 0).astype(
-                np.float32
-            )
-        return self.completed[name]
-
-    def plane(self, name: str) -> np.ndarray:
-        return PlaneDepth()(0, self.night.rig.visible(name))
-
-    def one_depth(self, name: str) -> np.ndarray:
-        return np.full((473, 583), 20.0, np.float32)
-
-    def refined_plane(self, rig: xcalib.Rig, names: list[str]):
-        """Horizon and roll found from the frames that the rig was fitted on."""
-        some = [names[i] for i in frames_to_judge_plane(len(names))]
-        images = (
-            [self.night.rig.visible(n) for n in some],
-            [self.night.rig.thermal(n) for n in some],
-        )
-        found = fit_plane(*images, PlaneDepth(), rig, xcalib.CalibrationOptions())
-        return lambda name: found(0, self.night.rig.visible(name))
-
-
 def night_folds(results: Results) -> Iterator[dict[str, Row]]:
-    """The rows of each fold, that of `NightRig` first."""
-    night = Night.open()
+    """The rows of each fold, the one of `NightRig.held` first."""
+    night = NightRig.open()
     if night is None:
         return
-    sources = Sources(night)
     for k in results.in_time(results.of((4, 0, 1, 2, 3), (4,))):
         fit, held = night.fold(k)
         fit, held = results.of((fit, held), (fit[:4], held[:2]))
@@ -130,12 +88,12 @@ def night_folds(results: Results) -> Iterator[dict[str, Row]]:
                 pairwise(row, method, night.reference(name), night.source(name))
         plane_rig = None
         for label, depth, options in (
-            (HOMOGRAPHY, sources.one_depth, {}),
-            (ADAM, sources.filled, {"solver": "adam"}),
-            (OURS, sources.filled, {}),
-            ("ours, semi-dense stereo", sources.semi_dense, {}),
-            ("ours, road plane", sources.plane, {}),
-            (COMPLETED, sources.completion, {}),
+            (HOMOGRAPHY, night.one_depth, {}),
+            (ADAM, night.filled, {"solver": "adam"}),
+            (OURS, night.filled, {}),
+            ("ours, semi-dense stereo", night.semi_dense, {}),
+            ("ours, road plane", night.plane, {}),
+            (COMPLETED, night.completed, {}),
             (REFINED, None, {}),
         ):
             if (results.quick and label not in (HOMOGRAPHY, OURS)) or (k != 4 and label in ONCE):
@@ -143,27 +101,23 @@ def night_folds(results: Results) -> Iterator[dict[str, Row]]:
             row = rows[label] = Row()
             start = time.perf_counter()
             if depth is None:
-                depth = sources.refined_plane(plane_rig, fit)
-            result = night.calibrate(fit, depth, xcalib.CalibrationOptions(**options))
+                plane = night.refined_plane(plane_rig, fit)
+                depth = lambda name, plane=plane: plane(0, night.visible(name))  # noqa: E731
+            result = night.fit(depth, fit, xcalib.CalibrationOptions(**options))
             row.fits.append(time.perf_counter() - start)
             row.trusted = int(result.converged)
             if label == "ours, road plane":
                 plane_rig = result.rig
             registrar = night.registrar(result.rig)
             for name in held:
-                reference, source, map_depth = (
-                    night.reference(name),
-                    night.source(name),
-                    depth(name),
-                )
+                reference, source = night.reference(name), night.source(name)
+                map_depth = depth(name)
                 start = time.perf_counter()
                 registrar.register(source, map_depth)
                 row.seconds.append(time.perf_counter() - start)
-                at, counts = mapped(registrar, source, map_depth)
+                at, counts = counted_map(registrar, source, map_depth)
                 row.judged.append(judge(reference, source, at, counts))
-            print(
-                f"fold {k}, {label}: {row.cells(night.size)}, t {result.rig.t.round(3)}", flush=True
-            )
+            print(f"fold {k}, {label}: {row.cells(SIZE)}, t {result.rig.t.round(3)}", flush=True)
         yield rows
 
 
@@ -181,7 +135,7 @@ def night_table(results: Results, name: str, folds: list[dict[str, Row]], note: 
             together.failures += fold[label].failures
             together.fits += fold[label].fits
             together.trusted += fold[label].trusted
-        rows.append([label, *together.cells((583, 473))])
+        rows.append([label, *together.cells(SIZE)])
     results.table(name, ["", *COLUMNS], [*rows, REPORTED], note)
 
 
@@ -244,10 +198,8 @@ def rendered_part(results: Results) -> None:
             registrars[label] = depths, xcalib.Registrar(result.rig)
         true = xcalib.Registrar(scene.rig)
         scale = scene.rig.reference.fx / scene.rig.source.fx
-        for i in range(held.start, held.stop):
-            source = scene.sources[i].astype(np.float32) / 255
-            reference = scene.references[i].mean(axis=2).astype(np.float32) / 255
-            truth, counts = mapped(true, source, scene.depths[i])
+        for i, (reference, source, depth) in enumerate(scene.gray_frames(held), held.start):
+            truth, counts = counted_map(true, source, depth)
             truth = np.where(counts[..., None], truth, np.nan)
             for label, method in PAIRWISE.items():
                 row = rows.setdefault(label, Row())
@@ -257,7 +209,7 @@ def rendered_part(results: Results) -> None:
                 start = time.perf_counter()
                 registrar.register(source, depths[i])
                 row.seconds.append(time.perf_counter() - start)
-                at, counts = mapped(registrar, source, depths[i])
+                at, counts = counted_map(registrar, source, depths[i])
                 row.judged.append(judge(reference, source, at, counts, truth, scale))
     order = [*PAIRWISE, *(label for label in rows if label not in PAIRWISE)]
     table = []

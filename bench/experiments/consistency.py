@@ -1,4 +1,4 @@
-"""Experiment 2: does the registered source move as the visible image does?
+"""Does the registered source move as the visible image does?
 
 Flow from frame to frame of the visible image, and of the registered source, by the same estimator:
 their difference where both are valid. Rendered drives, with depth that is noisy and flickers.
@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from baselines import NotFound, dense, homographies, unregistered
 from baselines.phase_congruency import rift
-from footage import HEIGHT, SOURCE_HEIGHT, SOURCE_WIDTH, WIDTH
 from judge import EROSION, sampled
+from rendered import HEIGHT, SOURCE_HEIGHT, SOURCE_WIDTH, WIDTH, Drive, mean_gray
 from results import Results
 
 import xcalib
@@ -19,21 +19,10 @@ from xcalib import synthetic
 from xcalib.depth.conditioning import SteadyDepth
 
 NOISE, FLICKER = 0.05, 0.03
-"""Of depth: smooth and new in each frame, and of the whole frame; relative."""
+"""Relative errors of the depth: smooth and new in each frame; common to a whole frame."""
 
 SKY = 200.0
-"""Its depth [m]: as a network would give one. Holes would be flow's own trouble."""
-
-
-class Drive(synthetic.Street):
-    """A street passed at so many metres a frame, its own frames being 6 m apart."""
-
-    def __init__(self, rig: xcalib.Rig, frames: int, metres: float, **kwargs) -> None:
-        super().__init__(rig, num_frames=frames, **kwargs)
-        self.slow = 6.0 / metres
-
-    def pose(self, index: float) -> tuple[np.ndarray, np.ndarray]:
-        return super().pose(index / self.slow)
+"""Its depth [m], as a network would give one: flow does badly at holes, whatever registered."""
 
 
 DRIVES = {
@@ -106,7 +95,7 @@ def run(results: Results, part: str | None, flow: Callable = dis) -> None:
         frames = [street.frame(i) for i in range(count)]
         rng = np.random.default_rng(1)
         depths = [noisy(f.depth, rng) for f in frames]
-        references = [f.reference.mean(axis=2).astype(np.float32) / 255 for f in frames]
+        references = [mean_gray(f.reference) for f in frames]
         sources = [f.source.astype(np.float32) / 255 for f in frames]
         for label, images in registered(frames, references, sources, depths).items():
             errors = []

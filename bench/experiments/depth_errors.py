@@ -1,4 +1,4 @@
-"""Experiment 6: errors of the depth. What does the rig absorb, and what stays in the image?
+"""Errors of the depth: what does the rig absorb, and what stays in the image?
 
 A rig is fitted with the wrong depth and registers with it. Beside it: the true rig with that depth,
 which absorbs nothing.
@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from footage import NEAR, Rendered, random_rigs
+from rendered import NEAR, Rendered, random_rigs
 from results import Results
 
 import xcalib

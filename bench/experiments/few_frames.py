@@ -1,37 +1,34 @@
-"""Experiment 8: how few frames suffice. Parts: `night`, `rendered`."""
+"""How few frames suffice. Parts: `night`, `rendered`."""
 
 import random
 
 import numpy as np
-from footage import Night, mapped, random_rigs
-from judge import gain, judge
+from judge import counted_map, gain, judge, patch_lengths
+from night import NightRig
+from rendered import random_rigs
 from results import Results
 
 
 def night_part(results: Results) -> None:
-    night = Night.open()
+    night = NightRig.open()
     if night is None:
         return
     fit, held = night.fold(4)
     held = results.of(held, held[:1])
-
-    def depth(name: str) -> np.ndarray:
-        return night.rig.depth("depth_filled", name)
-
     rows = []
     for count in results.in_time(results.of((2, 4, 8, 16, 32, 1), (2,))):
         draws = 1 if count == len(fit) else results.of(3, 1)
         medians, shares, gains, trusted = [], [], [], 0
         for seed in range(draws):
             chosen = sorted(random.Random(seed).sample(fit, count))
-            result = night.calibrate(chosen, depth)
+            result = night.fit(night.filled, chosen)
             registrar = night.registrar(result.rig)
             judged = []
             for name in held:
                 source = night.source(name)
-                at, counts = mapped(registrar, source, depth(name))
+                at, counts = counted_map(registrar, source, night.filled(name))
                 judged.append(judge(night.reference(name), source, at, counts))
-            norms = np.concatenate([j.patches.norms for j in judged])
+            norms = patch_lengths(judged)
             medians.append(np.median(norms) if len(norms) else np.inf)
             shares.append(np.mean(norms < 2) if len(norms) else 0)
             gains.append(gain(judged, "NEC"))

@@ -1,4 +1,4 @@
-"""Experiment 1: what the metrics say of aligned pairs that are shifted apart.
+"""What the metrics say of aligned pairs that are shifted apart.
 
 As printed: for delta = 0..20 the visible image shows u - 2 delta, the thermal one u + 2 delta, so
 that they are 4 delta px apart, over windows of one size.
@@ -6,8 +6,7 @@ that they are 4 delta px apart, over windows of one size.
 
 import cv2
 import numpy as np
-from common import data
-from night import gray
+from common import data, gray
 from results import Results
 
 from xcalib import metrics

@@ -1,11 +1,11 @@
-"""Experiment 9: what is recovered beside what the night rig's builders state.
+"""What is recovered beside what the night rig's builders state.
 
 They give the thermal camera at (0.127, -0.008, -0.055) m of the visible one, x to the right, and
 fields of view of 43-44 deg before an unknown crop. The depth's own scale is good to about 5 %.
 """
 
 import numpy as np
-from footage import Night
+from night import NightRig
 from results import Results
 
 import xcalib
@@ -15,17 +15,17 @@ HFOV = 43.5
 
 
 def run(results: Results, part: str | None) -> None:
-    night = Night.open()
+    night = NightRig.open()
     if night is None:
         return
     fit, _ = night.fold(4)
     fit = results.of(fit, fit[:3])
 
     def depth_times(factor: float):
-        return lambda name: (night.rig.depth("depth_filled", name) * factor).astype(np.float32)
+        return lambda name: (night.filled(name) * factor).astype(np.float32)
 
-    camera = night.rig.visible(fit[0]).shape
-    thermal = night.rig.thermal(fit[0]).shape
+    camera = night.visible(fit[0]).shape
+    thermal = night.thermal(fit[0]).shape
     both = {
         "reference_camera": xcalib.Pinhole.from_hfov(camera[1], camera[0], HFOV),
         "source_camera": xcalib.Pinhole.from_hfov(thermal[1], thermal[0], HFOV),
@@ -45,7 +45,7 @@ def run(results: Results, part: str | None) -> None:
     for label, (names, factor, options) in results.in_time(
         list(runs.items())[: results.of(None, 1)]
     ):
-        result = night.calibrate(names, depth_times(factor), xcalib.CalibrationOptions(**options))
+        result = night.fit(depth_times(factor), names, xcalib.CalibrationOptions(**options))
         rig, report = result.rig, result.report
         source = rig.source
         centre = -rig.R.T @ rig.t  # of the thermal camera, in the visible one's axes

@@ -1,16 +1,18 @@
 """Would registration gain if each frame were fitted anew? Two ways that were tried, and why not.
 
-The depth of each pixel within 10 % of what is given, by the agreement of edges along its epipolar
-line; and a frame's own shift, by the agreement of all its edges. Both look at what the scores look
-at, so a gain in the scores alone says nothing. The first is therefore held against the same search
-*across* the epipolar line, where no depth moves anything, and against a depth that is known.
+One refines the depth of each pixel, within 10 % of what is given, by how well edges agree along its
+epipolar line; the other finds a frame's own shift by how well all its edges agree. Both maximise
+what the scores measure, so a gain in the scores alone shows nothing. The first is therefore
+compared with the same search *across* the epipolar line, where depth moves nothing, and with known
+depth.
 """
 
 import cv2
 import numpy as np
 from depth_errors import displaced_edges, noise
-from footage import Night, mapped, rendered
-from judge import SCORE_COLUMNS, Judged, judge, sampled, scores
+from judge import SCORE_COLUMNS, Judged, counted_map, judge, sampled, score_cells
+from night import SIZE, NightRig
+from rendered import rendered
 from results import Results
 
 import xcalib
@@ -82,14 +84,14 @@ def refined(registrar, reference, source, depth, across: bool = False) -> np.nda
 
     ax, ay = reference_edges(reference)
     aa = window(ax * ax + ay * ay)
-    tells = aa / (aa + np.median(aa))
+    evidence = aa / (aa + np.median(aa))
     shares = np.linspace(-REACH, REACH, LABELS)
     costs = []
     for share in shares:
         bx, by = warped_edges(source, at_share(share))
         norm = np.sqrt(aa * window(bx * bx + by * by) + 1e-9)
         nec = window(np.abs(ax * bx + ay * by)) / norm
-        costs.append((1 - nec) * tells + TIE * (share / REACH) ** 2)
+        costs.append((1 - nec) * evidence + TIE * (share / REACH) ** 2)
     total = aggregated(np.array(costs, np.float32))
     best = np.clip(total.argmin(axis=0), 1, LABELS - 2)
     low, mid, high = (np.take_along_axis(total, (best + k)[None], 0)[0] for k in (-1, 0, 1))
@@ -131,9 +133,9 @@ def error(at: np.ndarray, truth: np.ndarray) -> tuple[float, float]:
     return float(np.median(lengths)), float(np.sqrt(np.mean(np.minimum(lengths, 10) ** 2)))
 
 
-def on_night(results: Results, night: Night) -> list[list[str]]:
+def on_night(results: Results, night: NightRig) -> list[list[str]]:
     """Scores in four folds of the 32 frames; returns rows of known depth errors."""
-    names = list(night.rig.fitted)
+    names = night.fitted
     ways = {
         "as it is": None,
         "depth refined": refined,
@@ -146,14 +148,12 @@ def on_night(results: Results, night: Night) -> list[list[str]]:
     for k in range(results.of(4, 1)):
         held = names[k::4]
         fit = [n for n in names if n not in held]
-        rig = night.calibrate(
-            results.of(fit, fit[:3]), lambda name: night.rig.depth("depth_filled", name)
-        ).rig
+        rig = night.fit(night.filled, results.of(fit, fit[:3])).rig
         registrar = night.registrar(rig)
         for name in results.of(held, held[:1]):
-            source, depth = night.source(name), night.rig.depth("depth_filled", name)
+            source, depth = night.source(name), night.filled(name)
             reference = night.reference(name)
-            at, counts = mapped(registrar, source, depth)
+            at, counts = counted_map(registrar, source, depth)
             for label, way in ways.items():
                 here = way(registrar, reference, source, depth) if way else at
                 judged[label].append(judge(reference, source, here, counts))
@@ -163,7 +163,7 @@ def on_night(results: Results, night: Night) -> list[list[str]]:
     results.table(
         "night",
         ["", *SCORE_COLUMNS],
-        [[label, *scores(found, night.size)] for label, found in judged.items()],
+        [[label, *score_cells(found, SIZE)] for label, found in judged.items()],
         f"{len(judged['as it is'])} frames of the night rig in folds, the 8 unseen ones not among"
         " them; filled stereo depth.",
     )
@@ -176,7 +176,7 @@ def known_row(label: str, errors) -> list[str]:
 
 
 def on_rendered(results: Results) -> list[list[str]]:
-    rig = synthetic.demo_rig().resized(583, 473, 579, 477)
+    rig = synthetic.demo_rig().resized(*SIZE, 579, 477)
     registrar = xcalib.Registrar(rig)
     frames = results.of(4, 1)
     scenes = [rendered(rig, frames, seed, night=seed == 7) for seed in (7, 8)]
@@ -190,11 +190,7 @@ def on_rendered(results: Results) -> list[list[str]]:
         rng = np.random.default_rng(0)
         known: list[list[tuple[float, float]]] = [[], []]
         for scene in scenes:
-            for visible, thermal, depth in zip(
-                scene.references, scene.sources, scene.depths, strict=True
-            ):
-                reference = visible.mean(axis=2).astype(np.float32) / 255
-                source = thermal.astype(np.float32) / 255
+            for reference, source, depth in scene.gray_frames():
                 wrong = change(depth, rng).astype(np.float32)
                 truth = registrar.map(depth)
                 known[0].append(error(registrar.map(wrong), truth))
@@ -205,7 +201,7 @@ def on_rendered(results: Results) -> list[list[str]]:
 
 def run(results: Results, part: str | None) -> None:
     rows = on_rendered(results)
-    if (night := Night.open()) is not None:
+    if (night := NightRig.open()) is not None:
         rows += on_night(results, night)
     results.table(
         "known",

@@ -1,17 +1,18 @@
-"""What the residual of the night rig's unseen frames consists of, by measurement.
+"""What the patch residual of the night rig's unseen frames consists of.
 
-The patch residual is taken apart: what a correction that could only mend one cause leaves of it.
-A correction that is fitted on the 32 frames (a smooth field, as of lens distortion, and a depth
-scale by depth) is judged on the other 8; one that is made from a judged frame itself (its own
-shift, its own affine) is a bound, not a method.
+Each row shows what is left of it after a correction that can mend one cause only. A correction
+fitted on the 32 frames (a smooth field, as of lens distortion, and a depth scale by depth) is
+judged on the other 8; one made from a judged frame itself (its own shift, its own affine) is a
+bound, not a method.
 """
 
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from footage import Night, mapped, rendered
-from judge import judge, systematic
+from judge import counted_map, judge, systematic
+from night import SIZE, NightRig
+from rendered import rendered
 from results import Results
 
 import xcalib
@@ -29,10 +30,10 @@ class Patches:
     bright: np.ndarray
 
 
-def measured(night: Night, registrar, name: str) -> Patches:
-    source, depth = night.source(name), night.rig.depth("depth_filled", name)
+def measured(night: NightRig, registrar, name: str) -> Patches:
+    source, depth = night.source(name), night.filled(name)
     reference = night.reference(name)
-    at, counts = mapped(registrar, source, depth)
+    at, counts = counted_map(registrar, source, depth)
     patches = judge(reference, source, at, counts).patches
     inverse, varied, bright = [], [], []
     for x, y in patches.centers.round().astype(int):
@@ -45,9 +46,9 @@ def measured(night: Night, registrar, name: str) -> Patches:
     return Patches(patches.centers, patches.shifts, *map(np.array, (inverse, varied, bright)))
 
 
-def basis(p: Patches, size: tuple[int, int], degree: int, by_depth: bool) -> np.ndarray:
+def basis(p: Patches, degree: int, by_depth: bool) -> np.ndarray:
     """Polynomials of the place, and of inverse depth where asked for."""
-    x, y = ((p.at[:, k] - size[k] / 2) / (size[0] / 2) for k in (0, 1))
+    x, y = ((p.at[:, k] - SIZE[k] / 2) / (SIZE[0] / 2) for k in (0, 1))
     columns = [x**i * y**j for i in range(degree + 1) for j in range(degree + 1 - i)]
     if by_depth:
         columns += [p.inverse, p.inverse * x, p.inverse * y]
@@ -97,10 +98,10 @@ def less(shift: np.ndarray, most: np.ndarray) -> np.ndarray:
     return shift - unit * np.clip((shift * unit).sum(axis=1, keepdims=True), -length, length)
 
 
-def without_neighbours(p: Patches, size: tuple[int, int], degree: int) -> np.ndarray:
-    """Less the frame's own field as patches that share no pixel with the block tell it."""
+def without_neighbours(p: Patches, degree: int) -> np.ndarray:
+    """Less the frame's own field, fitted to patches that share no pixel with the block."""
     block = (p.at[:, 0] // 110 + 10 * (p.at[:, 1] // 110)).astype(int)
-    a, left = basis(p, size, degree, False), p.shift.copy()
+    a, left = basis(p, degree, False), p.shift.copy()
     for b in np.unique(block):
         here = np.nonzero(block == b)[0]
         far = np.abs(p.at[:, None] - p.at[here][None]).max(axis=-1).min(axis=1) >= 48
@@ -109,7 +110,7 @@ def without_neighbours(p: Patches, size: tuple[int, int], degree: int) -> np.nda
     return left
 
 
-def systematic_by_chance(frames: list[Patches], size: tuple[int, int]) -> float:
+def systematic_by_chance(frames: list[Patches]) -> float:
     """The systematic residual of the same patches, their signs drawn: median of 200."""
     rng = np.random.default_rng(0)
     found = []
@@ -118,38 +119,35 @@ def systematic_by_chance(frames: list[Patches], size: tuple[int, int]) -> float:
             metrics.PatchResidual(p.at, p.shift * rng.choice([-1, 1], (len(p.at), 1)))
             for p in frames
         ]
-        found.append(systematic(drawn, size))
+        found.append(systematic(drawn, SIZE))
     return float(np.median(found))
 
 
 def own_noise(results: Results) -> list[str]:
-    """What the measure says of rendered nights of that size, registered by the true rig."""
-    rig = synthetic.demo_rig().resized(583, 473, 579, 477)
+    """The measure on rendered nights of that size, registered by the true rig."""
+    rig = synthetic.demo_rig().resized(*SIZE, 579, 477)
     scene = rendered(rig, results.of(6, 1), 7, night=True)
     registrar = xcalib.Registrar(rig)
     patches = []
-    for visible, thermal, depth in zip(scene.references, scene.sources, scene.depths, strict=True):
-        source = thermal / np.float32(255)
-        at, counts = mapped(registrar, source, depth)
-        reference = visible.mean(axis=2).astype(np.float32) / 255
+    for reference, source, depth in scene.gray_frames():
+        at, counts = counted_map(registrar, source, depth)
         patches.append(judge(reference, source, at, counts).patches)
     shift = np.concatenate([p.shifts for p in patches])
     norms = np.hypot(*shift.T)
     x, y = np.median(np.abs(shift), axis=0)
     return ["*the measure's own: rendered nights, true rig and depth*", f"{np.median(norms):.2f}",
             f"{np.mean(norms < 2):.0%}", f"{x:.2f}", f"{y:.2f}",
-            f"{systematic(patches, (583, 473)):.2f}", f"{len(norms)}"]  # fmt: skip
+            f"{systematic(patches, SIZE):.2f}", f"{len(norms)}"]  # fmt: skip
 
 
 def run(results: Results, part: str | None) -> None:
-    night = Night.open()
+    night = NightRig.open()
     if night is None:
         return
     fit, held = night.fold(4)
     fit, held = results.of((fit, held), (fit[:3], held[:1]))
-    rig = night.calibrate(fit, lambda name: night.rig.depth("depth_filled", name)).rig
+    rig = night.fit(night.filled, fit).rig
     registrar = night.registrar(rig)
-    size = night.size
     fitted = [measured(night, registrar, n) for n in fit]
     judged = [measured(night, registrar, n) for n in held]
     rows = []
@@ -164,7 +162,7 @@ def run(results: Results, part: str | None) -> None:
             [label, f"{np.median(norms):.2f}", f"{np.mean(norms < 2):.0%}",
              f"{np.median(np.abs(np.concatenate(shifts)[:, 0])):.2f}",
              f"{np.median(np.abs(np.concatenate(shifts)[:, 1])):.2f}",
-             f"{systematic(kept, size):.2f}", f"{len(norms)}"]
+             f"{systematic(kept, SIZE):.2f}", f"{len(norms)}"]
         )  # fmt: skip
 
     row("as it is", [p.shift for p in judged])
@@ -173,15 +171,15 @@ def run(results: Results, part: str | None) -> None:
         ("a smooth field of degree 3, from the 32 (distortion)", 3, False),
         ("the same and terms by inverse depth, from the 32", 3, True),
     ):
-        a = np.concatenate([basis(p, size, degree, by_depth) for p in fitted])
+        a = np.concatenate([basis(p, degree, by_depth) for p in fitted])
         solution = robust_fit(a, np.concatenate([p.shift for p in fitted]))
-        row(label, [p.shift - basis(p, size, degree, by_depth) @ solution for p in judged])
+        row(label, [p.shift - basis(p, degree, by_depth) @ solution for p in judged])
     for label, degree, by_depth in (
         ("its own shift (vibration, time): bound", 0, False),
         ("its own affine (rolling shutter, turns): bound", 1, False),
         ("its own shift and terms by inverse depth (motion): bound", 0, True),
     ):
-        own = [basis(p, size, degree, by_depth) for p in judged]
+        own = [basis(p, degree, by_depth) for p in judged]
         row(
             label,
             [p.shift - a @ robust_fit(a, p.shift) for p, a in zip(judged, own, strict=True)],
@@ -189,7 +187,7 @@ def run(results: Results, part: str | None) -> None:
     for label, degree in (("shift", 0), ("affine", 1)):
         row(
             f"its own {label}, from patches that share no pixel",
-            [without_neighbours(p, size, degree) for p in judged],
+            [without_neighbours(p, degree) for p in judged],
         )
     moves = [0.1 * parallax(registrar.rig, p) for p in judged]
     row(
@@ -202,7 +200,7 @@ def run(results: Results, part: str | None) -> None:
     )
     row("all along the baseline (x) taken away (depth): bound", [p.shift * (0, 1) for p in judged])
     row("all across it (y) taken away: bound", [p.shift * (1, 0) for p in judged])
-    chance = f"{systematic_by_chance(judged, size):.2f}"
+    chance = f"{systematic_by_chance(judged):.2f}"
     rows.append(["*signs of the patches drawn: systematic by chance*", *["-"] * 4, chance, "-"])
     rows.append(own_noise(results))
     results.table(
@@ -233,7 +231,7 @@ def run(results: Results, part: str | None) -> None:
         ("brightness of the visible image", np.concatenate([p.bright for p in every])),
         ("row [px]", np.concatenate([p.at[:, 1] for p in every])),
         ("distance to the centre [px]", np.concatenate(
-            [np.hypot(*(p.at - np.array(size) / 2).T) for p in every])),
+            [np.hypot(*(p.at - np.array(SIZE) / 2).T) for p in every])),
     ):  # fmt: skip
         edges = np.quantile(values, (0, 0.25, 0.5, 0.75, 1))
         cells = []

@@ -1,8 +1,8 @@
-"""Experiment 4: scales of the translation with Adam, from random starts; the same with Ceres."""
+"""Scales of the translation with Adam, from random starts; the same with Ceres."""
 
 import cv2
 import numpy as np
-from footage import HEIGHT, NEAR, SOURCE_HEIGHT, SOURCE_WIDTH, WIDTH, random_rigs
+from rendered import NEAR, random_rigs
 from results import Results
 
 import xcalib
@@ -10,11 +10,11 @@ import xcalib
 SCALES = (1, 2, 3)
 
 
-def random_start(rng: np.random.Generator) -> xcalib.Rig:
-    """Both cameras at 45 deg; turned by up to 2 deg about each axis, up to 0.5 m away."""
+def random_start(rig: xcalib.Rig, rng: np.random.Generator) -> xcalib.Rig:
+    """Both of its cameras at 45 deg; turned by up to 2 deg about each axis, up to 0.5 m away."""
     cameras = (
-        xcalib.Pinhole.from_hfov(*size, 45.0)
-        for size in ((WIDTH, HEIGHT), (SOURCE_WIDTH, SOURCE_HEIGHT))
+        xcalib.Pinhole.from_hfov(camera.width, camera.height, 45.0)
+        for camera in (rig.reference, rig.source)
     )
     R = cv2.Rodrigues(np.radians(rng.uniform(-2, 2, 3)))[0]
     return xcalib.Rig(*cameras, R, rng.uniform(-0.5, 0.5, 3) * (1, 1, 0.3))
@@ -25,7 +25,7 @@ def run(results: Results, part: str | None) -> None:
     scene = next(iter(random_rigs(1, frames, results.quick, **NEAR)))
     epochs = results.of(120 * 4 // frames, 1)  # the paper's 120 steps
     rng = np.random.default_rng(0)
-    starts = [random_start(rng) for _ in range(results.of(10, 1))]
+    starts = [random_start(scene.rig, rng) for _ in range(results.of(10, 1))]
     curves: dict[int, list[np.ndarray]] = {scales: [] for scales in SCALES}
     ends: dict[str, list[list[float]]] = {}
 

@@ -1,19 +1,19 @@
 """The paper's calibration in PyTorch, written from the paper: autograd, Adam, two stages.
 
-Without the flow term, whose network is not ours to ship. Equation names are the paper's; where it
-leaves something open, this follows docs/method.md: gradients are forward differences, a pixel
-counts where its whole stencil is seen by the source camera, and the lower clamp of
-Eq. (gradient_clamping) is off unless asked for. Pixel centres lie at integer coordinates. The C++
-twin is `CalibrationOptions(solver="adam")`, which has the objective of this library.
+Without the flow term, since we may not ship its network. Equation names are the paper's; where the
+paper leaves something open, this follows docs/method.md: gradients are forward differences, a pixel
+counts where the source camera sees its whole stencil, and the lower clamp of
+Eq. (gradient_clamping) is off unless asked for. Pixel centres lie at integer coordinates. The same
+in C++ is `CalibrationOptions(solver="adam")`, with the objective of this library.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import torch
+from common import gray
 from torch import Tensor
 from torch.nn.functional import grid_sample, huber_loss, normalize
 
@@ -44,11 +44,6 @@ class Frames:
 
     def batch(self, indices: Tensor) -> "Frames":
         return Frames(self.references[indices], self.sources[indices], self.depths[indices])
-
-
-def gray(image: np.ndarray) -> np.ndarray:
-    one = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
-    return one.astype(np.float32) / (np.iinfo(one.dtype).max if one.dtype.kind == "u" else 1)
 
 
 class Camera:

@@ -27,11 +27,12 @@ using Bytes = std::vector<char>;
 Image road(const Pinhole& camera, int scene) {
     Image depth(camera.width, camera.height, 80.0f);
     const double horizon = 0.42 * camera.height;
+    const auto slope = [&](double y) { return unproject(camera, 0, y, 1).y(); };
     for (int y = 0; y < depth.height; ++y)
         if (y > horizon)
             std::fill_n(depth.row(y), depth.width,
                         static_cast<float>(
-                            std::min(80.0, (1.4 + 0.1 * scene) * camera.fy / (y - horizon))));
+                            std::min(80.0, (1.4 + 0.1 * scene) / (slope(y) - slope(horizon)))));
     for (int post = 0; post < 8; ++post) {
         const int left = depth.width * (4 + 12 * post + scene) / 100;
         const int right = std::min(depth.width, left + std::max(1, depth.width * 3 / 100));

@@ -148,15 +148,15 @@ class AdamOptions:
     batch: int
     """Pairs, >= 1."""
     learning_rate: float
-    """Of stage 1, > 0."""
+    """Learning rate of stage 1, > 0."""
     fine_learning_rate: float
-    """Of stage 2, > 0."""
+    """Learning rate of stage 2, > 0."""
     decay: float
-    """Of either by a step, in (0, 1]."""
+    """Factor of either with each step, in (0, 1]."""
     fine_from: float
     """Share of all steps at which stage 2 begins, in [0, 1]."""
     translation_scales: int
-    """Of Eq. (translation), 1 to 3."""
+    """Scales of Eq. (translation), 1 to 3."""
 
     def __init__(self, **kwargs: Any) -> None: ...
 
@@ -166,7 +166,7 @@ class CalibrationOptions:
     max_frames: int
     """Pairs used, spread over the footage; >= 1."""
     seed: int
-    """Of the frame choice."""
+    """Seed of the frame choice."""
     num_threads: int
     """0 uses every core."""
     working_width: int
@@ -222,7 +222,7 @@ class LevelReport:
         """[px]"""
     @property
     def iterations(self) -> int:
-        """Of Levenberg-Marquardt."""
+        """Iterations of Levenberg-Marquardt."""
     @property
     def initial_cost(self) -> float:
         """Eq. (image_loss), and, where they act, the flow term and the prior."""
@@ -240,7 +240,7 @@ class LevelReport:
         """Share of the reference's edge energy that the source covers."""
     @property
     def condition_number(self) -> float:
-        """Of the normal equations, columns scaled to unit norm."""
+        """Condition number of the normal equations, columns scaled to unit norm."""
     @property
     def seconds(self) -> float:
         """[s]"""
@@ -258,7 +258,7 @@ class CandidateReport:
         """Pooled over the frames, of doubled angles, in [-1, 1]."""
     @property
     def overlap(self) -> float:
-        """Of both images' edges."""
+        """Overlap of both images' edges."""
     @property
     def refined_nec(self) -> float:
         """After the coarse levels."""
@@ -273,7 +273,7 @@ class AdamStep:
     """Before a step of Adam is taken: means over its batch."""
     @property
     def learning_rate(self) -> float:
-        """Of the step."""
+        """Learning rate of the step."""
     @property
     def image(self) -> float:
         """Eq. (image_loss)."""
@@ -303,7 +303,7 @@ class CalibrationReport:
         """Where they go [s]: `prepare` (working images and their pyramid), `search`, `warp`
         (reprojection and sampling of the passes over image pairs), `value` (the rest of the
         passes without derivatives), `jacobian` (the rest of those with them), `solver` (Ceres
-        itself). Of what threads do side by side, their sum divided by their number.
+        itself): the sum over threads divided by their number.
         """
     @property
     def working_width(self) -> int:
@@ -319,24 +319,25 @@ class CalibrationReport:
         """Typical of rigs displaced by many pixels."""
     @property
     def contrast(self) -> float:
-        """Of the NEC above the baseline, in deviations over displacements."""
+        """NEC above the baseline, in deviations over displacements."""
     @property
     def repeatability_px(self) -> float:
         """Median distance between fits to two halves of the frames [working px]."""
     @property
     def visible_shift_px(self) -> float:
-        """Of the shift, linear over the image, that flow between the registered images
-        still sees: the length that 90 % of the pixels do not exceed [working px];
-        NaN where it cannot tell."""
+        """Shift, linear over the image, that flow between the registered images still sees:
+        the length that 90 % of the pixels do not exceed [working px]; NaN where it is not
+        known.
+        """
     @property
     def valid_share(self) -> float:
-        """Of the reference's edge energy."""
+        """Share of the reference's edge energy."""
     @property
     def frames(self) -> list[int]:
         """Indices of the pairs used."""
     @property
     def candidates(self) -> list[CandidateReport]:
-        """Of the search, best score first."""
+        """Candidates of the search, best score first."""
     @property
     def levels(self) -> list[LevelReport]:
         """In the order solved."""
@@ -489,19 +490,19 @@ def psnr(
 def patch_shifts(
     reference: NDArray[Any], registered: NDArray[Any], mask: NDArray[Any] | None = None
 ) -> NDArray[float32]:
-    """(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches that tell; see
-    metrics.patch_residual().
+    """(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches with a clear
+    peak; see metrics.patch_residual().
     """
 
 class FlowOptions:
     """Options of patch_flow()."""
 
     step: int
-    """Of the grid of patches [px], odd, >= 3."""
+    """Distance of patches on their grid [px], odd, >= 3."""
     patch: int
     """Side of a patch [px], an odd multiple of the step."""
     levels: int
-    """Of the pyramid, >= 1."""
+    """Levels of the pyramid, >= 1."""
     max_shift: int
     """Farthest shift that the coarsest level looks for [px], >= 1."""
     def __init__(self, **kwargs: Any) -> None: ...
@@ -564,7 +565,7 @@ class OffsetEstimate:
     ) -> None: ...
     @property
     def offset(self) -> float:
-        """By how much the source's clock is late [s]; 0 where the footage does not tell."""
+        """By how much the source's clock is late [s]; 0 where the footage does not show it."""
     @property
     def trusted(self) -> bool:
         """Whether it does."""
@@ -606,8 +607,8 @@ class RefinedOffset:
     """A clock offset chosen by how well frames register, and what speaks for it."""
     @property
     def offset(self) -> float:
-        """By how much the source's clock is late [s]; the middle candidate where nothing is
-        told.
+        """By how much the source's clock is late [s]; the middle candidate where it is not
+        known.
         """
     @property
     def told(self) -> bool:
@@ -644,14 +645,16 @@ def refine_offset(
     """Chooses among candidate offsets [s], rising, around a guess in their middle.
 
     references, sources: times of their frames [s]. score: the RegisteredNec of a reference
-    and a source frame, by their indices, None where one cannot be decoded. Of the candidates
-    that differ from the best by less than the frames do among each other (two standard errors
-    of the mean), the one nearest to the middle is taken. max_frames: of the slower stream,
-    spread over the footage. Raises InputError without candidates.
+    and a source frame, by their indices, None where one cannot be decoded. Among the
+    candidates that differ from the best by less than the frames do among each other (two
+    standard errors of the mean), the one nearest to the middle is taken. max_frames: of the
+    slower stream, spread over the footage. Raises InputError without candidates.
     """
 
 def fingerprint(data: str | bytes) -> str:
-    """16 hexadecimal digits of a text, or of bytes: it tells changes by accident, not by intent."""
+    """16 hexadecimal digits of a text, or of bytes: it detects accidental changes, not intended
+    ones.
+    """
 
 def rig_fingerprint(rig: Rig) -> str:
     """The fingerprint() of all numbers of a rig."""
@@ -740,8 +743,8 @@ def match_depths(references: FrameList, used: Sequence[int], depths: FrameList) 
     """The depth map, as an index into depths, of each of the references used.
 
     Files under the names of the frames are theirs, and others are left over. Else the nearest
-    in time within half a period of the references, where both tell it; else by pair_files, of
-    all references or of those in use. Raises InputError.
+    in time within half a period of the references, where both have times; else by pair_files,
+    of all references or of those in use. Raises InputError.
     """
 
 def nearest_depths(
@@ -760,7 +763,7 @@ class Candidate:
         """A frame that cannot be decoded."""
     @property
     def index(self) -> int:
-        """Of the frame in the footage."""
+        """Index of the frame in the footage."""
     @property
     def decoded(self) -> bool:
         """Whether there were images to look at."""
@@ -793,7 +796,7 @@ class Choice:
     """The frames to calibrate on, and what was found out on the way."""
     @property
     def indices(self) -> list[int]:
-        """Of the frames taken, rising."""
+        """Indices of the frames taken, rising."""
     @property
     def candidates(self) -> list[Candidate]:
         """Every frame looked at, in order."""
@@ -804,7 +807,7 @@ class Choice:
         """One line per candidate: its name, what was measured, why it was taken or left."""
 
 def choose(candidates: Sequence[Candidate], max_frames: int) -> Choice:
-    """The Choice of at most max_frames of the candidates that say most about the rig; without a
+    """The Choice of at most max_frames of the candidates that determine the rig best; without a
     usable one it is empty.
     """
 
@@ -812,7 +815,7 @@ class ColorMap:
     """A curve in the colour cube, from cold to hot."""
     @property
     def name(self) -> str:
-        """Of a known map, or `estimated`."""
+        """Name of a known map, or `estimated`."""
     @property
     def curve(self) -> NDArray[uint8]:
         """(256, 3) uint8, blue, green, red."""
@@ -855,7 +858,7 @@ class PlaneDepth:
         """Raises InputError: field, value, range."""
     @property
     def camera_height(self) -> float:
-        """Of the reference camera above the road [m], > 0."""
+        """Height of the reference camera above the road [m], > 0."""
     @property
     def horizon(self) -> float:
         """Its row in the middle column, as a fraction of the image height from the top, (-1, 1)."""
@@ -864,7 +867,7 @@ class PlaneDepth:
         """Largest depth [m], > 0."""
     @property
     def hfov_deg(self) -> float:
-        """Of the reference camera [deg], (0, 180); pixels are square."""
+        """Horizontal field of view of the reference camera [deg], (0, 180); pixels are square."""
     @property
     def roll_deg(self) -> float:
         """How far the horizon falls towards the right [deg], (-45, 45)."""
@@ -982,7 +985,9 @@ def _flow_arguments() -> dict[str, str]:
     """CalibrationOptions.flow by what --flow of the command takes."""
 
 def report_document(report: CalibrationReport, rig_file: str, files: Sequence[str]) -> str:
-    """JSON text of a report, as `xcalib calibrate --report` writes it; files: those of its frames."""
+    """JSON text of a report, as `xcalib calibrate --report` writes it; files: those of its
+    frames.
+    """
 
 def evaluation_document(evaluation: Evaluation, rig_file: str, files: Sequence[str]) -> str:
     """JSON text of an Evaluation, as `xcalib evaluate --json` writes it; files: those of its

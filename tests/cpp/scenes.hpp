@@ -181,7 +181,7 @@ inline Rig moved(const Rig& rig, int parameter, double step) {
     SolverParameters p = solver_from_rig(rig);
     const auto in_camera = [step](SolverParameters::Camera& camera, int which) {
         double* const fields[] = {&camera.log_f[0], &camera.log_f[1], &camera.center[0],
-                                  &camera.center[1], &camera.skew[0]};
+                                  &camera.center[1], &camera.skew_share[0]};
         *fields[which] += step;
     };
     if (parameter >= kReferenceLogFx) in_camera(p.reference, parameter - kReferenceLogFx);

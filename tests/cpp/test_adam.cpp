@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calibrate/adam.hpp"
+#include "objective/paper_variables.hpp"
 #include "working_scene.hpp"
 
 namespace xcalib {
@@ -47,7 +48,7 @@ TEST(Adam, JacobianAgreesWithCentralDifferences) {
                                 const SolverParameters::Camera& to) {
             change.segment<5>(row) << to.log_f[0] - from.log_f[0], to.log_f[1] - from.log_f[1],
                 to.center[0] - from.center[0], to.center[1] - from.center[1],
-                to.skew[0] - from.skew[0];
+                to.skew_share[0] - from.skew_share[0];
         };
         camera(kSourceLogFx, a.source, b.source);
         camera(kReferenceLogFx, a.reference, b.reference);

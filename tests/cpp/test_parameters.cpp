@@ -88,7 +88,7 @@ TEST(SolverParameters, AreDimensionless) {
     EXPECT_DOUBLE_EQ(p.reference.log_f[1], std::log(400.0 / 480));
     EXPECT_DOUBLE_EQ(p.reference.center[0], 320.5 / 640);
     EXPECT_DOUBLE_EQ(p.reference.center[1], 240.5 / 480);
-    EXPECT_DOUBLE_EQ(p.reference.skew[0], 10.0 / 640);
+    EXPECT_DOUBLE_EQ(p.reference.skew_share[0], 10.0 / 640);
     EXPECT_NEAR(p.source.log_f[0], std::log(0.5), 1e-15);
     EXPECT_DOUBLE_EQ(p.source.center[0], 0.5);
     EXPECT_EQ(p.quaternion[0], 1);

@@ -36,14 +36,13 @@ TEST(ProjectionDerivative, IsTheChainRuleAndTheSameWithoutTheReference) {
     std::mt19937 random(4);
     const Rig rig = random_rig(random, 640, 480, 320, 256);
     const auto jacobian = warp_jacobian(rig, 333, 222, 4.5);
-    const Eigen::Vector3f ray = unproject(rig.reference, 333, 222, 1).cast<float>();
+    const SeenPoint point = seen_point(rig, 333, 222, 4.5);
     const ProjectionDerivative derivative(rig);
     constexpr int kStride = 3;
     std::vector<float> all(kStride * kNumParameters, -1.0f);
     std::vector<float> some(kStride * kNumParameters, -1.0f);
-    derivative.chain<kNumParameters>(ray.x(), ray.y(), 4.5f, 0.7f, -1.3f, all.data(), kStride);
-    derivative.chain<kNumWithoutReference>(ray.x(), ray.y(), 4.5f, 0.7f, -1.3f, some.data(),
-                                           kStride);
+    derivative.chain<kNumParameters>(point, 4.5f, 0.7f, -1.3f, all.data(), kStride);
+    derivative.chain<kNumWithoutReference>(point, 4.5f, 0.7f, -1.3f, some.data(), kStride);
     for (int p = 0; p < kNumParameters; ++p) {
         const double expected = 0.7 * jacobian(0, p) - 1.3 * jacobian(1, p);
         EXPECT_NEAR(all[p * kStride], expected, 1e-5 * jacobian.col(p).norm()) << p;

@@ -4,6 +4,8 @@
 #include <limits>
 #include <vector>
 
+#include "every_target.hpp"
+#include "geometry/projector.hpp"
 #include "scenes.hpp"
 #include "xcalib/warp.hpp"
 
@@ -26,7 +28,7 @@ struct Row {
 Row row_of(const Rig& rig, const std::vector<float>& depth, int y) {
     Row row{std::vector<float>(depth.size()), std::vector<float>(depth.size()),
             std::vector<std::uint8_t>(depth.size())};
-    map_row(Reprojection(rig), depth.data(), y, static_cast<int>(depth.size()), row.u.data(),
+    map_row(Projector(rig), depth.data(), y, static_cast<int>(depth.size()), row.u.data(),
             row.v.data(), row.validity.data());
     return row;
 }
@@ -78,6 +80,46 @@ TEST(MapRow, AgreesWithProjectingUnprojectedPointsInDouble) {
             EXPECT_GT(valid, 300);
         }
     }
+}
+
+TEST(MapRow, IsTheTransferOfEachPointOnEveryTarget) {
+    std::mt19937 random(3);
+    for (const int width : {1, 15, 16, 17, 333}) {
+        const Rig rig = random_rig(random, 640, 480, 320, 256);
+        std::vector<float> depth(width);
+        for (float& d : depth) d = static_cast<float>(std::exp(uniform(random, -0.7, 5)));
+        depth[width / 2] = 0;
+        const int y = static_cast<int>(uniform(random, 0, 480));
+        on_every_target([&] {
+            const Row row = row_of(rig, depth, y);
+            SeenRow seen(width);
+            seen_row(Projector(rig), depth.data(), y, width, seen);
+            for (int x = 0; x < width; ++x) {
+                const Eigen::Vector2d expected = transfer(rig, x, y, depth[x]);
+                ASSERT_EQ(row.validity[x] == kNoDepth, std::isnan(expected.x())) << x;
+                if (row.validity[x] == kValid) {
+                    ASSERT_LT((Eigen::Vector2d(row.u[x], row.v[x]) - expected).norm(), 3e-4) << x;
+                }
+                if (!(depth[x] > 0)) continue;
+                const SeenPoint p = seen_point(rig, x, y, depth[x]);
+                const float expect[] = {p.ray_x, p.ray_y, p.rx, p.ry, p.rz, p.x, p.y, p.inverse_z};
+                const float found[] = {seen.ray_x[x], seen.ray_y[x], seen.rx[x], seen.ry[x],
+                                       seen.rz[x],    seen.x[x],     seen.y[x],  seen.inverse_z[x]};
+                for (int i = 0; i < 8; ++i)
+                    ASSERT_NEAR(found[i], expect[i], 2e-6 * std::max(1.0f, depth[x])) << x << i;
+            }
+        });
+    }
+}
+
+TEST(Transfer, IsNowhereWithoutADepthAndBehindTheCamera) {
+    Rig rig{Pinhole::from_hfov(101, 81, 1.0), Pinhole::from_hfov(101, 81, 1.0), {}};
+    rig.source_from_reference.translation = {0, 0, -5};  // source camera 5 m ahead
+    EXPECT_LT((transfer(rig, 50, 40, 6) - Eigen::Vector2d(50, 40)).norm(), 1e-12);
+    EXPECT_GT(transfer(rig, 0, 40, 6).x(), -1000);  // far beside its image
+    EXPECT_LT(transfer(rig, 0, 40, 6).x(), 0);
+    for (const double depth : {5.0, 2.0, 0.0, -6.0, std::nan("")})
+        EXPECT_TRUE(transfer(rig, 50, 40, depth).array().isNaN().all()) << depth;
 }
 
 TEST(MapRow, WhatIsNotADepthIsNoDepth) {

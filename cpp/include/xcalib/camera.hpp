@@ -25,10 +25,24 @@ struct Pinhole {
 
     // Square pixels, principal point at the image centre. hfov in (0, pi).
     static Pinhole from_hfov(int width, int height, double hfov);
+    // The inverse of K(); K may have any scale.
+    static Pinhole from_K(int width, int height, const Eigen::Matrix3d& K);
 
     Eigen::Matrix3d K() const;
     double hfov() const;  // 2 atan(width / (2 fx))
     double vfov() const;
+
+    // What the image covers of the plane z = 1: the tangents of the angles to its borders.
+    struct Field {
+        double left, right, top, bottom;
+        double width() const { return right - left; }
+    };
+    Field field() const;
+    // Beside the optical axis, along x and y.
+    Eigen::Vector2d pixels_per_radian() const { return {fx, fy}; }
+
+    // The same image of a view so many times as narrow.
+    Pinhole zoomed(double factor) const;
 
     // The same camera seen through its image flipped left to right.
     Pinhole flipped() const;
@@ -66,6 +80,11 @@ struct Rig {
 
     Eigen::Matrix3d R() const { return source_from_reference.rotation.toRotationMatrix(); }
     const Eigen::Vector3d& t() const { return source_from_reference.translation; }
+
+    // Source pixels to a reference pixel, of something far on the optical axes, along x and y.
+    Eigen::Vector2d source_density() const {
+        return source.pixels_per_radian().cwiseQuotient(reference.pixels_per_radian());
+    }
 
     Rig resized(int reference_width, int reference_height, int source_width,
                 int source_height) const;

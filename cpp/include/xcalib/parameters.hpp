@@ -67,9 +67,9 @@ PaperParameters paper_from_rig(const Rig& rig);
 // same at every pyramid level.
 struct SolverParameters {
     struct Camera {
-        double log_f[2];   // log(fx / width), log(fy / height)
-        double center[2];  // (cx + 1/2) / width, (cy + 1/2) / height
-        double skew[1];    // skew / width
+        double log_f[2];       // log(fx / width), log(fy / height)
+        double center[2];      // (cx + 1/2) / width, (cy + 1/2) / height
+        double skew_share[1];  // skew / width
     };
     Camera reference;
     Camera source;

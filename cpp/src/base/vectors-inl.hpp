@@ -8,6 +8,16 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
+
+// x86 with eight lanes or more; of Highway's targets, the better has the lower number.
+#undef XCALIB_X86_LANES
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+#define XCALIB_X86_LANES 1
+#else
+#define XCALIB_X86_LANES 0
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace xcalib {
 namespace HWY_NAMESPACE {
@@ -20,8 +30,26 @@ using Float = hn::Vec<FloatTag>;
 using Int = hn::Vec<IntTag>;
 using Mask = hn::Mask<FloatTag>;
 
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(FloatTag()));
+
 HWY_INLINE int lanes() { return static_cast<int>(hn::Lanes(FloatTag())); }
+HWY_INLINE Float set(double value) { return hn::Set(FloatTag(), static_cast<float>(value)); }
+HWY_INLINE Int set(int value) { return hn::Set(IntTag(), value); }
 HWY_INLINE Float load(const float* from) { return hn::LoadU(FloatTag(), from); }
+// Of `left` that there are, 0 past them.
+HWY_INLINE Float load(const float* from, int left) {
+    if (left >= kLanes) return load(from);
+    HWY_ALIGN float room[kLanes] = {};
+    std::copy_n(from, left, room);
+    return hn::Load(FloatTag(), room);
+}
+// As many as fit before the end, `left` on.
+HWY_INLINE void store(Float value, float* to, int left) {
+    if (left >= kLanes) return hn::StoreU(value, FloatTag(), to);
+    HWY_ALIGN float room[kLanes];
+    hn::Store(value, FloatTag(), room);
+    std::copy_n(room, left, to);
+}
 HWY_INLINE double total(Float sum) {
     return static_cast<double>(hn::GetLane(hn::SumOfLanes(FloatTag(), sum)));
 }

@@ -60,11 +60,7 @@ Rig with_shifted_depth(const Rig& rig, double shift) {
     const Eigen::Matrix3d U = lower.reverse();
     const Eigen::Matrix3d inverse = U.inverse();
     Rig out = rig;
-    out.source.fx = U(0, 0) / U(2, 2);
-    out.source.skew = U(0, 1) / U(2, 2);
-    out.source.cx = U(0, 2) / U(2, 2);
-    out.source.fy = U(1, 1) / U(2, 2);
-    out.source.cy = U(1, 2) / U(2, 2);
+    out.source = Pinhole::from_K(rig.source.width, rig.source.height, U);
     out.source_from_reference.rotation = Eigen::Quaterniond(inverse * A).normalized();
     out.source_from_reference.translation = inverse * K * rig.t();
     return out;
@@ -93,11 +89,13 @@ double ordinary_shift(const Rig& rig, double farthest) {
     // Usual deviations: shares of the image size, and of the focal length.
     constexpr double kCentre = 0.02, kAspect = 0.005, kSkew = 0.005;
     const auto strangeness = [&](double shift) {
-        const Pinhole camera = with_shifted_depth(rig, shift).source;
-        const double x = ((camera.cx + 0.5) / camera.width - 0.5) / kCentre;
-        const double y = ((camera.cy + 0.5) / camera.height - 0.5) / kCentre;
-        const double aspect = std::log(camera.fy / camera.fx) / kAspect;
-        const double skew = camera.skew / camera.fx / kSkew;
+        const Rig shifted = with_shifted_depth(rig, shift);
+        const SolverParameters::Camera camera = solver_from_rig(shifted).source;
+        const double x = (camera.center[0] - 0.5) / kCentre;
+        const double y = (camera.center[1] - 0.5) / kCentre;
+        const Eigen::Vector2d scale = shifted.source.pixels_per_radian();
+        const double aspect = std::log(scale.y() / scale.x()) / kAspect;
+        const double skew = camera.skew_share[0] * rig.source.width / scale.x() / kSkew;
         const double from_start = shift / farthest;
         return x * x + y * y + aspect * aspect + skew * skew + from_start * from_start;
     };

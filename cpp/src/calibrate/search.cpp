@@ -31,14 +31,13 @@ struct DirectionMap {
 
 // The map that holds the camera's whole image, at the given step.
 DirectionMap map_for(const Pinhole& camera, double step) {
-    const double left = std::atan((camera.cx + 0.5) / camera.fx);
-    const double right = std::atan((camera.width - 0.5 - camera.cx) / camera.fx);
-    const double top = std::asinh((camera.cy + 0.5) / camera.fy);
-    const double bottom = std::asinh((camera.height - 0.5 - camera.cy) / camera.fy);
+    const Pinhole::Field field = camera.field();
     DirectionMap map;
     map.step = step;
-    map.width = 2 * static_cast<int>(std::ceil(std::max(left, right) / step)) + 1;
-    map.height = 2 * static_cast<int>(std::ceil(std::max(top, bottom) / step)) + 1;
+    map.width =
+        2 * static_cast<int>(std::ceil(std::atan(std::max(-field.left, field.right)) / step)) + 1;
+    map.height =
+        2 * static_cast<int>(std::ceil(std::asinh(std::max(-field.top, field.bottom)) / step)) + 1;
     return map;
 }
 
@@ -272,12 +271,14 @@ std::vector<EdgeMap> reduced_for(const std::vector<EdgeMap>& maps, double factor
 
 // Do two candidates lie in one basin? Compared by where they send the reference's inner points.
 double distance(const Rig& a, const Rig& b) {
-    const Eigen::Matrix3d ha = infinite_homography(a), hb = infinite_homography(b);
+    const auto far = [](const Rig& rig, double x, double y) -> Eigen::Vector2d {
+        return project(rig.source, rig.R() * unproject(rig.reference, x, y, 1));
+    };
     double sum = 0;
     for (double y : {0.3, 0.5, 0.7})
         for (double x : {0.3, 0.5, 0.7}) {
-            const Eigen::Vector3d p(x * a.reference.width, y * a.reference.height, 1);
-            sum += ((ha * p).hnormalized() - (hb * p).hnormalized()).norm();
+            const double u = x * a.reference.width, v = y * a.reference.height;
+            sum += (far(a, u, v) - far(b, u, v)).norm();
         }
     return sum / 9 / a.source.width;
 }
@@ -310,7 +311,7 @@ std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& reference
             for (std::size_t k = 0; k < space.rolls.size(); ++k) trials.push_back({s, k});
         const Pinhole camera =
             hypothesis.reference.resized(reference_maps[0].width, reference_maps[0].height);
-        const double step = 1 / camera.fx;
+        const double step = 1 / camera.pixels_per_radian().x();
         steps.push_back(step);
         const DirectionMap map = map_for(camera, step);
         std::vector<DirectionMap> source_maps;
@@ -336,8 +337,8 @@ std::vector<SearchCandidate> global_search(const std::vector<EdgeMap>& reference
         reduced_sources.resize(std::max(known, cameras));
         parallel_each(static_cast<int>(reduced_sources.size() - known), num_threads, [&](int i) {
             const Pinhole& source = hypothesis.sources[known + i];
-            reduced_sources[known + i] =
-                reduced_for(sources, source.fx / source.width * sources[0].width * step);
+            reduced_sources[known + i] = reduced_for(
+                sources, source.pixels_per_radian().x() / source.width * sources[0].width * step);
         });
         parallel_each(static_cast<int>(trials.size()), num_threads, [&](int i) {
             Trial& trial = trials[i];

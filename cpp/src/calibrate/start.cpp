@@ -28,8 +28,7 @@ double merit(const Value& value) {
 
 // Where the field of view of the reference makes little difference, it is the paper's 45 deg.
 double preference(const Rig& rig) {
-    const double ratio =
-        std::log(rig.reference.width / rig.reference.fx / (2 * std::tan(22.5 * kDegree)));
+    const double ratio = std::log(rig.reference.field().width() / (2 * std::tan(22.5 * kDegree)));
     return 1 - 0.12 * std::abs(ratio);
 }
 
@@ -79,10 +78,8 @@ Rig with_parallax(const Rig& rig, const Eigen::Vector3d& t, double inverse_depth
 // stays, and rotation and translation, so that the middle of the image and its parallax do.
 Rig with_reference_focal(const Rig& rig, const Eigen::Quaterniond& mount, double factor) {
     Rig out = rig;
-    out.reference.fx *= factor;
-    out.reference.fy *= factor;
-    out.source.fx *= factor;
-    out.source.fy *= factor;
+    out.reference = rig.reference.zoomed(factor);
+    out.source = rig.source.zoomed(factor);
     const Eigen::AngleAxisd rotation(rig.source_from_reference.rotation * mount.conjugate());
     const Eigen::Vector3d vector = rotation.angle() * rotation.axis();
     // Roll is an angle in the image; pan and tilt are displacements over the focal length.
@@ -117,8 +114,9 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal, co
     const CalibrationOptions& options = plan.options;
     const Eigen::Quaterniond mount(
         Eigen::AngleAxisd(plan.mount.roll_deg * kDegree, Eigen::Vector3d::UnitZ()));
-    const double f = level.rig_at(candidate.rig).source.fx;
-    const double half = 0.5 * level.width * f / level.rig_at(candidate.rig).reference.fx;
+    const Rig at_level = level.rig_at(candidate.rig);
+    const double f = at_level.source.pixels_per_radian().x();
+    const double half = 0.5 * level.width * at_level.source_density().x();
     candidate.merit =
         preference(candidate.rig) * merit(pooled(level, candidate.rig, options.num_threads));
     for (int round = 0; round < 2; ++round) {
@@ -145,7 +143,7 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal, co
                 [&](int i) {
                     const double focal = paper * std::pow(1.2, i - 5);
                     return with_reference_focal(from, mount,
-                                                focal * from.reference.width / from.reference.fx);
+                                                focal * from.reference.field().width());
                 },
                 candidate);
         }
@@ -157,9 +155,7 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal, co
             [&](int i) {  // scale and roll
                 Rig rig = before;
                 if (!options.source_camera) {
-                    const double scale = 1 + (i % side - kReach) / half;
-                    rig.source.fx *= scale;
-                    rig.source.fy *= scale;
+                    rig.source = before.source.zoomed(1 + (i % side - kReach) / half);
                 }
                 return turn_source(rig, Eigen::Vector3d(0, 0, (i / side - kReach) / half));
             },
@@ -218,11 +214,7 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
                 const double tangent = scale * std::tan(centre.hfov() / 2);
                 if (tangent > widest) continue;
                 Pinhole guess = camera_guess(source, 2 * std::atan(tangent));
-                if (local) {
-                    guess = initial->source;
-                    guess.fx /= scale;
-                    guess.fy /= scale;
-                }
+                if (local) guess = initial->source.zoomed(1 / scale);
                 hypothesis.sources.push_back(guess);
             }
         }

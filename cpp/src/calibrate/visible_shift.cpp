@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "base/median.hpp"
+#include "geometry/projector.hpp"
 #include "solve/flow_term.hpp"
-#include "xcalib/warp.hpp"
 
 namespace xcalib {
 namespace {
@@ -19,14 +19,11 @@ constexpr double kSoft = 0.5;   // [px of the level] up to which all residuals c
 
 // Where the rig maps a reference pixel, and whether the source sees it there.
 struct Place {
-    Eigen::Vector2d at = Eigen::Vector2d::Zero();
-    bool seen = false;
+    Eigen::Vector2d at;
+    bool seen;
 
     Place(const Rig& rig, double x, double y, double depth) {
-        if (!(depth > 0)) return;
-        const Eigen::Vector3d point = rig.R() * unproject(rig.reference, x, y, depth) + rig.t();
-        if (!(point.z() > kNearestZ)) return;
-        at = project(rig.source, point);
+        at = transfer(rig, x, y, depth);
         seen = at.x() >= 0 && at.y() >= 0 && at.x() <= rig.source.width - 1 &&
                at.y() <= rig.source.height - 1;
     }
@@ -76,7 +73,7 @@ double visible_shift(const WorkingImages& images, const Rig& rig, int num_thread
             for (int x = kFlowCell / 2; x < depth.width; x += kFlowCell)
                 if (Place(here, x, y, depth.row(y)[x]).seen)
                     seen.push_back(row_of(here.reference, x, y));
-        const double reference_px = here.reference.fx / here.source.fx;
+        const double reference_px = 1 / here.source_density().x();
         for (const FlowTarget& target : flow[i].targets) {
             const Place place(here, target.x, target.y, target.depth);
             if (!place.seen) continue;

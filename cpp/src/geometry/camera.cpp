@@ -35,6 +35,11 @@ Pinhole Pinhole::from_hfov(int width, int height, double hfov) {
     return camera;
 }
 
+Pinhole Pinhole::from_K(int width, int height, const Eigen::Matrix3d& K) {
+    const Eigen::Matrix3d k = K / K(2, 2);
+    return {width, height, k(0, 0), k(1, 1), k(0, 2), k(1, 2), k(0, 1)};
+}
+
 Eigen::Matrix3d Pinhole::K() const {
     Eigen::Matrix3d k;
     k << fx, skew, cx, 0, fy, cy, 0, 0, 1;
@@ -43,6 +48,17 @@ Eigen::Matrix3d Pinhole::K() const {
 
 double Pinhole::hfov() const { return 2 * std::atan(width / (2 * fx)); }
 double Pinhole::vfov() const { return 2 * std::atan(height / (2 * fy)); }
+
+Pinhole::Field Pinhole::field() const {
+    return {-(cx + 0.5) / fx, (width - 0.5 - cx) / fx, -(cy + 0.5) / fy, (height - 0.5 - cy) / fy};
+}
+
+Pinhole Pinhole::zoomed(double factor) const {
+    Pinhole camera = *this;
+    camera.fx *= factor;
+    camera.fy *= factor;
+    return camera;
+}
 
 Pinhole Pinhole::flipped() const {
     Pinhole out = *this;

@@ -1,6 +1,5 @@
 #include "xcalib/judge/describe.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -34,15 +33,14 @@ RigFacts describe(const Rig& rig) {
     facts.roll_deg = std::atan2(axes(1, 0), axes(1, 1)) * kDegrees;
     facts.position = -(axes * rig.t());
     facts.baseline = rig.t().norm();
-    const Eigen::Vector3d centre((rig.reference.width - 1) / 2.0, (rig.reference.height - 1) / 2.0,
-                                 1.0);
-    const Eigen::Vector3d ray = rig.reference.K().inverse() * centre;
+    const Eigen::Vector3d ray = unproject(rig.reference, (rig.reference.width - 1) / 2.0,
+                                          (rig.reference.height - 1) / 2.0, 1);
     const auto point = [&](double inverse_depth) -> Eigen::Vector2d {
-        const Eigen::Vector3d x = rig.source.K() * (rig.R() * ray + inverse_depth * rig.t());
+        const Eigen::Vector3d x = rig.R() * ray + inverse_depth * rig.t();
         // A point behind the source camera has no image.
         if (!(x.z() > 0))
             return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-        return x.head<2>() / x.z();
+        return project(rig.source, x);
     };
     for (const double depth : {2.0, 5.0, 10.0, 50.0, 0.0}) {
         RigFacts::Centre row;

@@ -116,7 +116,7 @@ struct Evaluator::State {
         size = reduced(reference.width, reference.height, (reference.width + width - 1) / width);
         const Rig small = full.resized(size.width, size.height, source.width, source.height);
         // A source much finer than the grid would be sampled with aliasing.
-        const int finer = std::max(1, static_cast<int>(small.source.fx / small.reference.fx));
+        const int finer = std::max(1, static_cast<int>(small.source_density().x()));
         source_size = reduced(source.width, source.height, finer);
         RegistrarOptions options;
         options.num_threads = num_threads;

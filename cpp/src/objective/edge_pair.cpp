@@ -2,7 +2,6 @@
 #include <vector>
 
 #include "base/kernel_targets.hpp"
-#include "geometry/map_row.hpp"
 #include "objective/image_pair.hpp"
 #include "objective/nec_pass.hpp"
 
@@ -22,8 +21,7 @@ namespace {
 struct EdgePass {
     const EdgeMap &reference, &source;
     const Image& depth;
-    const Pinhole& camera;
-    Reprojection reprojection;
+    Projector projector;
     ProjectionDerivative derivative;
     const Parameters& parameters;
     float turn_real, turn_imaginary;
@@ -38,10 +36,10 @@ struct EdgePass {
 
     EdgePass(const EdgeMap& reference, const EdgeMap& source, const Image& depth, const Rig& rig,
              const Parameters& parameters)
-        : reference(reference), source(source), depth(depth), camera(rig.reference),
-          reprojection(rig), derivative(rig), parameters(parameters),
-          points(parameters.size() > 0 ? depth.width : 0), u(depth.width + kRoom, NAN),
-          v(depth.width + kRoom, NAN), real(depth.width + kRoom, parameters.size()),
+        : reference(reference), source(source), depth(depth), projector(rig), derivative(rig),
+          parameters(parameters), points(parameters.size() > 0 ? depth.width : 0),
+          u(depth.width + kRoom, NAN), v(depth.width + kRoom, NAN),
+          real(depth.width + kRoom, parameters.size()),
           imaginary(depth.width + kRoom, parameters.size()), validity(depth.width) {
         const Eigen::Matrix3d R = rig.R();
         const double roll = std::atan2(R(1, 0), R(0, 0));
@@ -80,8 +78,8 @@ HWY_INLINE ComplexSample sample(const EdgePass& pass, const Cell& cell) {
 EdgeSums warp_edge_row(EdgePass& pass, int y) {
     const FloatTag d;
     const int width = pass.depth.width;
-    map_row_inline(pass.reprojection, pass.depth.row(y), y, width, pass.u.data(), pass.v.data(),
-                   pass.validity.data());
+    map_row(pass.projector, pass.depth.row(y), y, width, pass.u.data(), pass.v.data(),
+            pass.validity.data());
     const Float turn_real = hn::Set(d, pass.turn_real);
     const Float turn_imaginary = hn::Set(d, pass.turn_imaginary);
     const float* HWY_RESTRICT reference = reinterpret_cast<const float*>(pass.reference.row(y));
@@ -122,10 +120,10 @@ void append_edge_row(EdgePass& pass, int y, PassTile& tile) {
     const FloatTag d;
     const int width = pass.depth.width, stride = width + kRoom;
     const float* depth = pass.depth.row(y);
-    point_row(pass.derivative, pass.camera, depth, y, width, pass.points);
+    seen_row(pass.projector, depth, y, width, pass.points);
     for (EdgePass::Component* part : {&pass.real, &pass.imaginary})
-        derivative_row(pass.derivative, pass.parameters, pass.camera, depth, y, part->du.data(),
-                       part->dv.data(), width, pass.points, part->derivative.data(), stride);
+        derivative_row(pass.derivative, pass.parameters, depth, part->du.data(), part->dv.data(),
+                       width, pass.points, part->derivative.data(), stride);
     for (int i = 0; i < tile.count; ++i) {
         if (pass.parameters[i] != kRotationZ) continue;
         for (int x = 0; x < width; ++x) {  // of exp(-2 i phi)

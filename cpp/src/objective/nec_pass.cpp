@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "base/kernel_targets.hpp"
-#include "geometry/map_row.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "objective/nec_pass.cpp"
@@ -32,8 +31,7 @@ struct WarpedRow {
 // What the rows of a pass have in common.
 struct Pass {
     const NecFrame& frame;
-    const Pinhole& reference;
-    Reprojection reprojection;
+    Projector projector;
     ProjectionDerivative derivative;
     const Parameters& parameters;
     PointRow points;
@@ -41,11 +39,10 @@ struct Pass {
     std::vector<std::uint8_t> validity;
 
     Pass(const NecFrame& frame, const Rig& rig, const Parameters& parameters)
-        : frame(frame), reference(rig.reference), reprojection(rig), derivative(rig),
-          parameters(parameters), points(parameters.size() > 0 ? frame.depth.width : 0),
-          u(frame.depth.width + kRoom, NAN), v(frame.depth.width + kRoom, NAN),
-          du(frame.depth.width + kRoom), dv(frame.depth.width + kRoom),
-          validity(frame.depth.width) {}
+        : frame(frame), projector(rig), derivative(rig), parameters(parameters),
+          points(parameters.size() > 0 ? frame.depth.width : 0), u(frame.depth.width + kRoom, NAN),
+          v(frame.depth.width + kRoom, NAN), du(frame.depth.width + kRoom),
+          dv(frame.depth.width + kRoom), validity(frame.depth.width) {}
 };
 
 // The stencil of one row of pixels: its own row, its neighbours, and the reference's edges there.
@@ -73,8 +70,7 @@ void warp_row(Pass& pass, int y, WarpedRow& row) {
     const FloatTag d;
     const int width = pass.frame.depth.width;
     const float* depth = pass.frame.depth.row(y);
-    map_row_inline(pass.reprojection, depth, y, width, pass.u.data(), pass.v.data(),
-                   pass.validity.data());
+    map_row(pass.projector, depth, y, width, pass.u.data(), pass.v.data(), pass.validity.data());
     const Image& source = pass.frame.source;
     const float* HWY_RESTRICT pixels = source.pixels.data();
     const bool slopes = pass.parameters.size() > 0;
@@ -98,9 +94,9 @@ void warp_row(Pass& pass, int y, WarpedRow& row) {
 void derive_row(Pass& pass, int y, WarpedRow& row) {
     const int width = pass.frame.depth.width;
     const float* depth = pass.frame.depth.row(y);
-    point_row(pass.derivative, pass.reference, depth, y, width, pass.points);
-    derivative_row(pass.derivative, pass.parameters, pass.reference, depth, y, pass.du.data(),
-                   pass.dv.data(), width, pass.points, row.derivative.data(), row.stride);
+    seen_row(pass.projector, depth, y, width, pass.points);
+    derivative_row(pass.derivative, pass.parameters, depth, pass.du.data(), pass.dv.data(), width,
+                   pass.points, row.derivative.data(), row.stride);
 }
 
 // Central differences of three rows, for a vector of pixels from x on.

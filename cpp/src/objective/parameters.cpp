@@ -43,7 +43,7 @@ Pinhole pinhole_from_solver(const SolverParameters::Camera& p, int width, int he
     camera.fy = std::exp(p.log_f[1]) * height;
     camera.cx = p.center[0] * width - 0.5;
     camera.cy = p.center[1] * height - 0.5;
-    camera.skew = p.skew[0] * width;
+    camera.skew = p.skew_share[0] * width;
     return camera;
 }
 

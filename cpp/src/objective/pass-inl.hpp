@@ -68,39 +68,13 @@ HWY_INLINE Sampled interpolated(const Cell& cell, Float t0, Float t1, Float b0, 
             hn::MulAdd(cell.b, hn::Sub(bottom_step, top_step), top_step), down};
 }
 
-// Of pixels that are not valid the results may be anything.
-void point_row(const ProjectionDerivative& derivative, const Pinhole& reference,
-               const float* HWY_RESTRICT depth, int y, int width, PointRow& row) {
-    const double ray_y = (y - reference.cy) / reference.fy;
-    const float y0 = static_cast<float>(ray_y);
-    const float x0 = static_cast<float>(-(reference.cx + reference.skew * ray_y) / reference.fx);
-    const float step = static_cast<float>(1 / reference.fx);
-    const ProjectionDerivative d = derivative;
-    float* HWY_RESTRICT ray_x = row.ray_x.data();
-    float* HWY_RESTRICT px = row.x.data();
-    float* HWY_RESTRICT py = row.y.data();
-    float* HWY_RESTRICT pz = row.inverse_z.data();
-    float* HWY_RESTRICT rx = row.rx.data();
-    float* HWY_RESTRICT ry = row.ry.data();
-    float* HWY_RESTRICT rz = row.rz.data();
-    for (int x = 0; x < width; ++x) {
-        ray_x[x] = x0 + step * static_cast<float>(x);
-        const ProjectionDerivative::Point p = d.point(ray_x[x], y0, depth[x]);
-        px[x] = p.x;
-        py[x] = p.y;
-        pz[x] = p.inverse_z;
-        rx[x] = p.rx;
-        ry[x] = p.ry;
-        rz[x] = p.rz;
-    }
-}
-
 template <int kParameter>
-void partial_row(const ProjectionDerivative& derivative, const PointRow& row, float ray_y,
+void partial_row(const ProjectionDerivative& derivative, const PointRow& row,
                  const float* HWY_RESTRICT depth, const float* HWY_RESTRICT du,
                  const float* HWY_RESTRICT dv, int width, float* HWY_RESTRICT out) {
     const ProjectionDerivative d = derivative;
     const float* HWY_RESTRICT ray_x = row.ray_x.data();
+    const float* HWY_RESTRICT ray_y = row.ray_y.data();
     const float* HWY_RESTRICT px = row.x.data();
     const float* HWY_RESTRICT py = row.y.data();
     const float* HWY_RESTRICT pz = row.inverse_z.data();
@@ -111,16 +85,16 @@ void partial_row(const ProjectionDerivative& derivative, const PointRow& row, fl
     const float* HWY_RESTRICT qy = row.qy.data();
     const float* HWY_RESTRICT qz = row.qz.data();
     for (int x = 0; x < width; ++x)
-        out[x] = d.partial<kParameter>(ray_x[x], ray_y, depth[x],
-                                       {px[x], py[x], pz[x], rx[x], ry[x], rz[x]},
-                                       {du[x], dv[x], qx[x], qy[x], qz[x]});
+        out[x] =
+            d.partial<kParameter>({ray_x[x], ray_y[x], rx[x], ry[x], rz[x], px[x], py[x], pz[x]},
+                                  depth[x], {du[x], dv[x], qx[x], qy[x], qz[x]});
 }
 
 // df by the parameters, parameter-major, for a row of df/du and df/dv.
 void derivative_row(const ProjectionDerivative& derivative, const Parameters& parameters,
-                    const Pinhole& reference, const float* HWY_RESTRICT depth, int y,
-                    const float* HWY_RESTRICT du, const float* HWY_RESTRICT dv, int width,
-                    PointRow& row, float* HWY_RESTRICT out, int stride) {
+                    const float* HWY_RESTRICT depth, const float* HWY_RESTRICT du,
+                    const float* HWY_RESTRICT dv, int width, PointRow& row, float* HWY_RESTRICT out,
+                    int stride) {
     const ProjectionDerivative d = derivative;
     const float* HWY_RESTRICT px = row.x.data();
     const float* HWY_RESTRICT py = row.y.data();
@@ -129,16 +103,16 @@ void derivative_row(const ProjectionDerivative& derivative, const Parameters& pa
     float* HWY_RESTRICT qy = row.qy.data();
     float* HWY_RESTRICT qz = row.qz.data();
     for (int x = 0; x < width; ++x) {
-        const ProjectionDerivative::Slope s = d.slope({px[x], py[x], pz[x], 0, 0, 0}, du[x], dv[x]);
+        const ProjectionDerivative::Slope s =
+            d.slope({0, 0, 0, 0, 0, px[x], py[x], pz[x]}, du[x], dv[x]);
         qx[x] = s.qx;
         qy[x] = s.qy;
         qz[x] = s.qz;
     }
-    const float ray_y = static_cast<float>((y - reference.cy) / reference.fy);
     for (int i = 0; i < parameters.size(); ++i)
         ProjectionDerivative::each<kNumParameters>([&](auto p) {
             if (parameters[i] == p)
-                partial_row<p>(derivative, row, ray_y, depth, du, dv, width, out + i * stride);
+                partial_row<p>(derivative, row, depth, du, dv, width, out + i * stride);
         });
 }
 

@@ -6,18 +6,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "geometry/projector.hpp"
+
 namespace xcalib {
 
 inline constexpr int kRoom = 64;  // past the end of a row: more than any vector holds
 
-// dX_S/dp of a row of pixels, in parts that the derivative of anything is put together from.
-struct PointRow {
-    std::vector<float> ray_x, x, y, inverse_z, rx, ry, rz, qx, qy, qz;
+// The points of a row, and df/dX_S of what is derived there.
+struct PointRow : SeenRow {
+    std::vector<float> qx, qy, qz;
 
-    explicit PointRow(int width) {
-        for (std::vector<float>* part : {&ray_x, &x, &y, &inverse_z, &rx, &ry, &rz, &qx, &qy, &qz})
-            part->resize(width + kRoom);
-    }
+    explicit PointRow(int width)
+        : SeenRow(width), qx(width + kRoom), qy(width + kRoom), qz(width + kRoom) {}
 };
 
 // Pixels in columns of [ds/dp ..., s, r]: s is the source's and r the reference's vector at a

@@ -5,6 +5,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "geometry/projector.hpp"
 #include "xcalib/parameters.hpp"
 
 namespace xcalib {
@@ -14,33 +15,16 @@ namespace xcalib {
 class ProjectionDerivative {
    public:
     explicit ProjectionDerivative(const Rig& rig)
-        : R_(rig.R().cast<float>()), t_(rig.t().cast<float>()), reference_(rig.reference),
+        : R_(rig.R().cast<float>()), reference_(rig.reference),
           fx_(static_cast<float>(rig.source.fx)), fy_(static_cast<float>(rig.source.fy)),
           skew_(static_cast<float>(rig.source.skew)), width_(static_cast<float>(rig.source.width)),
           height_(static_cast<float>(rig.source.height)) {}
-
-    // A reference pixel of normalized ray (x, y, 1) and its depth [m], seen by the source camera.
-    struct Point {
-        float x, y, inverse_z;  // X_S / Z_S, Y_S / Z_S, 1 / Z_S
-        float rx, ry, rz;       // R X_R
-    };
-    Point point(float ray_x, float ray_y, float depth) const {
-        const float xr = depth * ray_x, yr = depth * ray_y;
-        Point p;
-        p.rx = R_(0, 0) * xr + R_(0, 1) * yr + R_(0, 2) * depth;
-        p.ry = R_(1, 0) * xr + R_(1, 1) * yr + R_(1, 2) * depth;
-        p.rz = R_(2, 0) * xr + R_(2, 1) * yr + R_(2, 2) * depth;
-        p.inverse_z = 1.0f / (p.rz + t_.z());
-        p.x = (p.rx + t_.x()) * p.inverse_z;
-        p.y = (p.ry + t_.y()) * p.inverse_z;
-        return p;
-    }
 
     // df/du and df/dv, and from them df/dX_S.
     struct Slope {
         float du, dv, qx, qy, qz;
     };
-    Slope slope(const Point& p, float df_du, float df_dv) const {
+    Slope slope(const SeenPoint& p, float df_du, float df_dv) const {
         Slope s;
         s.du = df_du;
         s.dv = df_dv;
@@ -52,7 +36,7 @@ class ProjectionDerivative {
 
     // df by one parameter.
     template <int kParameter>
-    float partial(float ray_x, float ray_y, float depth, const Point& p, const Slope& s) const {
+    float partial(const SeenPoint& p, float depth, const Slope& s) const {
         if constexpr (kParameter == kSourceLogFx) return s.du * fx_ * p.x;
         if constexpr (kParameter == kSourceLogFy) return s.dv * fy_ * p.y;
         if constexpr (kParameter == kSourceCx) return s.du * width_;
@@ -74,24 +58,22 @@ class ProjectionDerivative {
             // df/d ray
             const float ex = depth * (R_(0, 0) * s.qx + R_(1, 0) * s.qy + R_(2, 0) * s.qz);
             const float ey = depth * (R_(0, 1) * s.qx + R_(1, 1) * s.qy + R_(2, 1) * s.qz);
-            if constexpr (kParameter == kReferenceLogFx) return -ex * ray_x;
+            if constexpr (kParameter == kReferenceLogFx) return -ex * p.ray_x;
             // fx ray_x = u - cx - skew ray_y: ray_y's part does not scale with fx.
-            if constexpr (kParameter == kReferenceLogFy) return (ex * skew / fx - ey) * ray_y;
+            if constexpr (kParameter == kReferenceLogFy) return (ex * skew / fx - ey) * p.ray_y;
             if constexpr (kParameter == kReferenceCx) return -ex * w / fx;
             if constexpr (kParameter == kReferenceCy) return (ex * skew / fx - ey) * h / fy;
-            if constexpr (kParameter == kReferenceSkew) return -ex * ray_y * w / fx;
+            if constexpr (kParameter == kReferenceSkew) return -ex * p.ray_y * w / fx;
         }
     }
 
     // By the first kCount parameters: writes out[p * stride] for p in 0..kCount-1.
     template <int kCount>
-    void chain(float ray_x, float ray_y, float depth, float df_du, float df_dv, float* out,
+    void chain(const SeenPoint& p, float depth, float df_du, float df_dv, float* out,
                int stride) const {
-        const Point p = point(ray_x, ray_y, depth);
         const Slope s = slope(p, df_du, df_dv);
-        each<kCount>([&](auto parameter) {
-            out[parameter * stride] = partial<parameter>(ray_x, ray_y, depth, p, s);
-        });
+        each<kCount>(
+            [&](auto parameter) { out[parameter * stride] = partial<parameter>(p, depth, s); });
     }
 
     // Calls work(std::integral_constant<int, p>) for p in 0..kCount-1.
@@ -107,7 +89,6 @@ class ProjectionDerivative {
     }
 
     Eigen::Matrix3f R_;
-    Eigen::Vector3f t_;
     Pinhole reference_;
     float fx_, fy_, skew_, width_, height_;
 };

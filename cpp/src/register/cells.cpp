@@ -17,8 +17,9 @@ constexpr double kMostCells = 4e6;  // of which the kernel can count
 }  // namespace
 
 CellGrid::CellGrid(const Rig& rig) {
-    double x = std::min(kMostPerPixel, rig.reference.fx / rig.source.fx);
-    double y = std::min(kMostPerPixel, rig.reference.fy / rig.source.fy);
+    const Eigen::Vector2d density = rig.source_density();
+    double x = std::min(kMostPerPixel, 1 / density.x());
+    double y = std::min(kMostPerPixel, 1 / density.y());
     const double cells = (rig.source.width * x + 2) * (rig.source.height * y + 2);
     const double reduction = std::min(1.0, std::sqrt(kMostCells / cells));
     x *= reduction;
@@ -29,11 +30,11 @@ CellGrid::CellGrid(const Rig& rig) {
     per_pixel_x = static_cast<float>(x);
     per_pixel_y = static_cast<float>(y);
     relative_tolerance = static_cast<float>(kRelativeTolerance);
-    const double moved_x = x * rig.source.fx * std::abs(rig.t().x());
-    const double moved_y = y * rig.source.fy * std::abs(rig.t().y());
-    along_x = moved_x >= moved_y;
-    absolute_tolerance = static_cast<float>(
-        kLeastShift / (std::max(x * rig.source.fx, y * rig.source.fy) * rig.t().norm()));
+    const Eigen::Vector2d scale = rig.source.pixels_per_radian();
+    const double cells_x = x * scale.x(), cells_y = y * scale.y();  // per radian
+    along_x = cells_x * std::abs(rig.t().x()) >= cells_y * std::abs(rig.t().y());
+    absolute_tolerance =
+        static_cast<float>(kLeastShift / (std::max(cells_x, cells_y) * rig.t().norm()));
 }
 
 }  // namespace xcalib

@@ -60,7 +60,7 @@ struct Registrar::Stream {
 
     Rig rig;
     RegistrarOptions options;
-    Reprojection reprojection;
+    Projector projector;
     CellGrid grid;
     int parts;
     bool occlusion;
@@ -69,7 +69,7 @@ struct Registrar::Stream {
     std::vector<std::unique_ptr<Cells>> spare;  // one for each call that there was at a time
 
     Stream(const Rig& for_rig, const RegistrarOptions& with)
-        : rig(for_rig), options(with), reprojection(rig), grid(rig),
+        : rig(for_rig), options(with), projector(rig), grid(rig),
           parts(std::min(resolve_threads(options.num_threads), kMostParts)),
           // Cameras at one place see the same.
           occlusion(options.occlusion != Occlusion::ignore && rig.t().norm() > 0),
@@ -114,7 +114,7 @@ struct Registrar::Stream {
                 Nearness* own = cells->data() + part * size;
                 std::fill_n(own, size, Nearness{0});
                 for (int y = next.fetch_add(kRows); y < height; y = next.fetch_add(kRows))
-                    splat_rows(reprojection, depth, grid, y, std::min(height, y + kRows), own);
+                    splat_rows(projector, depth, grid, y, std::min(height, y + kRows), own);
             });
             Nearness* out = cells->data() + parts * size;
             in_rows(grid.height, [&](int begin, int end) {
@@ -169,7 +169,7 @@ DepthView on_grid(const ImageView& depth, double scale, const Pinhole& grid, Ima
 void Registrar::map(const ImageView& depth, float* out) const {
     Image room;
     RowsTask task{};
-    task.reprojection = &stream_->reprojection;
+    task.projector = &stream_->projector;
     task.depth = on_grid(depth, options().depth_scale, rig().reference, room);
     task.grid = &stream_->grid;
     task.hide = options().occlusion == Occlusion::hide;
@@ -190,7 +190,7 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
         throw std::invalid_argument("source takes more than 2 GiB, expected less");
     Image room;
     RowsTask task{};
-    task.reprojection = &stream_->reprojection;
+    task.projector = &stream_->projector;
     task.depth = on_grid(depth, options().depth_scale, rig().reference, room);
     task.grid = &stream_->grid;
     task.hide = options().occlusion == Occlusion::hide;

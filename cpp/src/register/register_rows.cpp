@@ -25,10 +25,8 @@ HWY_INLINE void sample(const RowsTask& task, const Source& source, const Row& ro
     const IntTag di;
     const Located at = locate(row, depth, x);
     Points p = at.points();
-    Mask valid = confine(*task.reprojection, depth, p);
-    Int codes = hn::IfThenElse(hn::RebindMask(di, is_depth(depth)), code_of(Validity::outside),
-                               code_of(Validity::no_depth));
-    codes = hn::IfThenZeroElse(hn::RebindMask(di, valid), codes);
+    Mask valid = confine(*task.projector, depth, p);
+    Int codes = codes_of(depth, valid);
     if (task.cells) {
         const Mask gone = hn::And(valid, hidden(*task.grid, task.cells, p));
         codes = hn::IfThenElse(hn::RebindMask(di, gone), code_of(Validity::occluded), codes);
@@ -51,9 +49,9 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
 #endif
     for (int y = begin; y < end; ++y) {
 #if HWY_TARGET != HWY_SCALAR
-        const Reach reach = reach_of<T>(source, source_step(*task.reprojection, width / 2, y));
+        const Reach reach = reach_of<T>(source, task.projector->step_along_row(width / 2, y));
 #endif
-        const Row row(*task.reprojection, y, kHalfBack);
+        const Row row(task.projector->to_image, y, kHalfBack);
         const DepthRow depth(task.depth, y);
         T* out = reinterpret_cast<T*>(static_cast<char*>(task.registered.data) +
                                       y * task.registered.row_bytes);
@@ -72,7 +70,7 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
         };
         int x = 0;
 #if HWY_TARGET != HWY_SCALAR
-        const RowPair rows(*task.reprojection, y);
+        const RowPair rows(*task.projector, y);
         while (!task.nearest && width - x >= kLanes) {
             const int count = std::min(kVectors, (width - x) / kLanes);
             Vectors left =
@@ -105,7 +103,7 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
     const int width = task.depth.view.width;
     const Float none = set(std::numeric_limits<double>::quiet_NaN());
     for (int y = begin; y < end; ++y) {
-        const Row row(*task.reprojection, y, kHalfBack);
+        const Row row(task.projector->to_image, y, kHalfBack);
         const DepthRow depth(task.depth, y);
         float* out = map + 2 * static_cast<std::size_t>(y) * width;
         Float along = hn::Iota(d, 0.0f);
@@ -113,7 +111,7 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
             HWY_ALIGN float u[kLanes], v[kLanes];
             const Float metres = depth.load(x, width - x);
             Points p = locate(row, metres, along).points();
-            Mask valid = confine(*task.reprojection, metres, p);
+            Mask valid = confine(*task.projector, metres, p);
             if (task.cells && task.hide)
                 valid = hn::AndNot(hidden(*task.grid, task.cells, p), valid);
             hn::Store(hn::IfThenElse(valid, p.u, none), d, u);

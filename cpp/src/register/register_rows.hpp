@@ -3,8 +3,9 @@
 
 #include <cstdint>
 
+#include "geometry/projector.hpp"
 #include "register/cells.hpp"
-#include "xcalib/warp.hpp"
+#include "xcalib/image.hpp"
 
 namespace xcalib {
 
@@ -15,8 +16,8 @@ struct DepthView {
 };
 
 // Raises the cells to the nearness of the points of rows [begin, end) that fall in them.
-void splat_rows(const Reprojection& reprojection, const DepthView& depth, const CellGrid& grid,
-                int begin, int end, Nearness* cells);
+void splat_rows(const Projector& projector, const DepthView& depth, const CellGrid& grid, int begin,
+                int end, Nearness* cells);
 
 // Rows [begin, end) of the cells of all `count` parts as one: the nearest of each, and where both
 // neighbours, left and right or above and below, are nearer, the farther of these: a surface whose
@@ -26,7 +27,7 @@ void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begi
 
 // What all rows of a frame have in common. `cells` is null where occlusion is not looked for.
 struct RowsTask {
-    const Reprojection* reprojection;
+    const Projector* projector;
     DepthView depth;
     const CellGrid* grid;
     const Nearness* cells;

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "register/project-inl.hpp"
+#include "register/locate-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace xcalib {

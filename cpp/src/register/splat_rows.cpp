@@ -7,7 +7,7 @@
 #define HWY_TARGET_INCLUDE "register/splat_rows.cpp"
 #include <hwy/foreach_target.h>
 
-#include "register/project-inl.hpp"
+#include "register/locate-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace xcalib {
@@ -56,7 +56,7 @@ HWY_INLINE Vectors splat_together(const CellGrid& grid, const Row& row, const De
     for (int i = 0; i < count; ++i) {
         const Float depth = depths.load(begin + i * kLanes);
         depths.prefetch_next_row(begin + i * kLanes);
-        const Points p = project_roughly(row, depth, along);
+        const Points p = project<false>(row, depth, along);
         const Float start = hn::Sub(p.u, hn::Iota(d, 0.0f));
         u[i] = hn::ExtractLane(start, kLanes / 2);
         v[i] = hn::ExtractLane(p.v, kLanes / 2);
@@ -91,16 +91,16 @@ HWY_INLINE Vectors splat_together(const CellGrid& grid, const Row& row, const De
 }
 #endif
 
-void splat_rows(const Reprojection& reprojection, const DepthView& depth, const CellGrid& grid,
-                int begin, int end, Nearness* HWY_RESTRICT cells) {
+void splat_rows(const Projector& projector, const DepthView& depth, const CellGrid& grid, int begin,
+                int end, Nearness* HWY_RESTRICT cells) {
     const int width = depth.view.width;
     for (int y = begin; y < end; ++y) {
-        const Row row(reprojection, y, 0, grid.per_pixel_x, grid.per_pixel_y);
+        const Row row(projector.to_image, y, 0, grid.per_pixel_x, grid.per_pixel_y);
         const DepthRow depths(depth, y);
         const auto splat_at = [&](int x) HWY_ATTR {
             const Float along = hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
             const Float z = depths.load(x, width - x);
-            splat(grid, z, project_roughly(row, z, along), cells);
+            splat(grid, z, project<false>(row, z, along), cells);
         };
         int x = 0;
 #if HWY_TARGET != HWY_SCALAR
@@ -170,9 +170,9 @@ HWY_EXPORT(join_cells);
 
 }  // namespace
 
-void splat_rows(const Reprojection& reprojection, const DepthView& depth, const CellGrid& grid,
-                int begin, int end, Nearness* cells) {
-    HWY_DYNAMIC_DISPATCH(splat_rows)(reprojection, depth, grid, begin, end, cells);
+void splat_rows(const Projector& projector, const DepthView& depth, const CellGrid& grid, int begin,
+                int end, Nearness* cells) {
+    HWY_DYNAMIC_DISPATCH(splat_rows)(projector, depth, grid, begin, end, cells);
 }
 
 void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begin, int end,

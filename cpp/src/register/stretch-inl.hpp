@@ -68,7 +68,7 @@ template <bool fixed, bool with_cells>
 HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& depths, int y,
                        int begin, int count, const char* out, int vector_bytes, Stretch& stretch) {
     const FloatTag d;
-    const Float least = hn::Set(d, least_depth(*task.reprojection, y, task.depth.view.width));
+    const Float least = hn::Set(d, task.projector->least_depth(y, task.depth.view.width));
     Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
     for (int i = 0; i < count; ++i) {
         UsualVector& vector = stretch.vectors[i];
@@ -242,8 +242,9 @@ HWY_INLINE Vectors sample_fixed(const Source& source, int count, Stretch& stretc
 struct RowPair {
     Row exact, fixed;
 
-    HWY_INLINE RowPair(const Reprojection& r, int y)
-        : exact(r, y, kHalfBack), fixed(r, y, kFixedShift, kFixedUnit, kFixedUnit) {}
+    HWY_INLINE RowPair(const Projector& projector, int y)
+        : exact(projector.to_image, y, kHalfBack),
+          fixed(projector.to_image, y, kFixedShift, kFixedUnit, kFixedUnit) {}
 };
 
 // Locates vectors of a row, `count` from pixel `begin` on, and samples them. Returns those of which

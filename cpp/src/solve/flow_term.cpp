@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/parallel.hpp"
+#include "geometry/projector.hpp"
 #include "objective/projection_derivative.hpp"
 #include "xcalib/gray.hpp"
 #include "xcalib/warp.hpp"
@@ -21,18 +22,16 @@ constexpr double kMinWeight = 0.02;
 
 double unit_of(const FlowTargets& targets) {
     const Pinhole& reference = targets.rig.reference;
-    return reference.fx / targets.rig.source.fx / (0.5 * reference.width);
+    return 1 / targets.rig.source_density().x() / (0.5 * reference.width);
 }
 
-// Calls work(target, ray, point) with the reference pixel's ray and the point in the source camera;
-// what comes to lie behind the camera is left out.
+// Calls work(target, at) with where the target's pixel lies in the source now; those that come to
+// lie behind the camera are left out.
 template <class Work>
 void for_each(const FlowTargets& targets, const Rig& rig, const Work& work) {
-    const Eigen::Matrix3d R = rig.R();
     for (const FlowTarget& target : targets.targets) {
-        const Eigen::Vector3d ray = unproject(rig.reference, target.x, target.y, 1.0);
-        const Eigen::Vector3d point = R * (target.depth * ray) + rig.t();
-        if (point.z() > kNearestZ) work(target, ray, project(rig.source, point));
+        const Eigen::Vector2d at = transfer(rig, target.x, target.y, target.depth);
+        if (at.allFinite()) work(target, at);
     }
 }
 
@@ -59,10 +58,8 @@ FlowTargets targets_of(const FlowField& field, const Image& depth, const Rig& ri
             const float to_x = x + field.x[best], to_y = y + field.y[best];
             const float here = depth_at(x, y), there = depth_at(to_x, to_y);
             if (!(here > 0 && there > 0)) continue;
-            const Eigen::Vector3d point =
-                rig.R() * unproject(rig.reference, to_x, to_y, there) + rig.t();
-            if (!(point.z() > kNearestZ)) continue;
-            const Eigen::Vector2d at = project(rig.source, point);
+            const Eigen::Vector2d at = transfer(rig, to_x, to_y, there);
+            if (!at.allFinite()) continue;
             out.targets.push_back({x, y, here, static_cast<float>(at.x()),
                                    static_cast<float>(at.y()), field.confidence[best]});
         }
@@ -90,11 +87,10 @@ void require_field(const FlowField& field, const Image& image) {
 double flow_value(const FlowTargets& targets, const Rig& rig) {
     const double unit = unit_of(targets);
     double value = 0;
-    for_each(targets, rig,
-             [&](const FlowTarget& target, const Eigen::Vector3d&, const Eigen::Vector2d& at) {
-                 const double e = unit * (at - Eigen::Vector2d(target.u, target.v)).norm();
-                 value += target.weight * (std::hypot(e, kSoft) - kSoft);
-             });
+    for_each(targets, rig, [&](const FlowTarget& target, const Eigen::Vector2d& at) {
+        const double e = unit * (at - Eigen::Vector2d(target.u, target.v)).norm();
+        value += target.weight * (std::hypot(e, kSoft) - kSoft);
+    });
     return value;
 }
 
@@ -106,21 +102,19 @@ FlowEquations flow_equations(const FlowTargets& targets, const Rig& rig,
     Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(count, count);
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(count), j(count);
     double value = 0;
-    for_each(targets, rig,
-             [&](const FlowTarget& target, const Eigen::Vector3d& ray, const Eigen::Vector2d& at) {
-                 const Eigen::Vector2d e = unit * (at - Eigen::Vector2d(target.u, target.v));
-                 const double length = std::sqrt(e.squaredNorm() + kSoft * kSoft);
-                 value += target.weight * (length - kSoft);
-                 float row[kNumParameters];
-                 for (int axis = 0; axis < 2; ++axis) {
-                     derivative.chain<kNumParameters>(static_cast<float>(ray.x()),
-                                                      static_cast<float>(ray.y()), target.depth,
-                                                      axis == 0, axis == 1, row, 1);
-                     for (int i = 0; i < count; ++i) j[i] = unit * row[parameters[i]];
-                     hessian += target.weight / length * j * j.transpose();
-                     gradient += target.weight / length * e[axis] * j;
-                 }
-             });
+    for_each(targets, rig, [&](const FlowTarget& target, const Eigen::Vector2d& at) {
+        const Eigen::Vector2d e = unit * (at - Eigen::Vector2d(target.u, target.v));
+        const double length = std::sqrt(e.squaredNorm() + kSoft * kSoft);
+        value += target.weight * (length - kSoft);
+        const SeenPoint point = seen_point(rig, target.x, target.y, target.depth);
+        float row[kNumParameters];
+        for (int axis = 0; axis < 2; ++axis) {
+            derivative.chain<kNumParameters>(point, target.depth, axis == 0, axis == 1, row, 1);
+            for (int i = 0; i < count; ++i) j[i] = unit * row[parameters[i]];
+            hessian += target.weight / length * j * j.transpose();
+            gradient += target.weight / length * e[axis] * j;
+        }
+    });
     return {value, hessian, gradient};
 }
 

@@ -56,8 +56,8 @@ RigCost::RigCost(const Rig& sizes, const Parameters& free) : sizes_(sizes), free
 }
 
 std::vector<double*> RigCost::blocks(SolverParameters& p) {
-    return {p.source.log_f, p.source.center,   p.source.skew,      p.quaternion,
-            p.translation,  p.reference.log_f, p.reference.center, p.reference.skew};
+    return {p.source.log_f, p.source.center,   p.source.skew_share, p.quaternion,
+            p.translation,  p.reference.log_f, p.reference.center,  p.reference.skew_share};
 }
 
 bool RigCost::Evaluate(double const* const* parameters, double* residuals,

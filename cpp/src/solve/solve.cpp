@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
+#include "geometry/projector.hpp"
 #include "solve/nec_cost.hpp"
-#include "xcalib/warp.hpp"
 
 namespace xcalib {
 namespace {
@@ -59,10 +59,10 @@ void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
     } else {
         problem.SetManifold(p.quaternion, new ceres::QuaternionManifold);
     }
-    for (double* block : {p.source.center, p.source.skew})
+    for (double* block : {p.source.center, p.source.skew_share})
         if (stage == 1 || source_known) problem.SetParameterBlockConstant(block);
     if (source_known) problem.SetParameterBlockConstant(p.source.log_f);
-    for (double* block : {p.reference.log_f, p.reference.center, p.reference.skew})
+    for (double* block : {p.reference.log_f, p.reference.center, p.reference.skew_share})
         if (!reference_free || (stage == 1 && block != p.reference.log_f))
             problem.SetParameterBlockConstant(block);
 }
@@ -209,8 +209,8 @@ LevelReport solve_stage(const WorkingImages& images, const Level& level, int sta
 }
 
 double median_distance(const Level& level, const Rig& a, const Rig& b) {
-    const Reprojection to_a(level.rig_at(a)), to_b(level.rig_at(b));
-    const double scale = level.factor * level.rig_at(a).reference.fx / level.rig_at(a).source.fx;
+    const Projector to_a(level.rig_at(a)), to_b(level.rig_at(b));
+    const double scale = level.factor / level.rig_at(a).source_density().x();
     std::vector<double> distances;
     std::vector<float> ua(level.width), va(level.width), ub(level.width), vb(level.width);
     std::vector<std::uint8_t> ok_a(level.width), ok_b(level.width);

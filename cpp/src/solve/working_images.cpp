@@ -179,8 +179,9 @@ namespace {
 
 // Source pixels to a reference pixel at this level, along the width, if the source were so wide.
 double density_at(const Level& level, int source_width, const Rig& rig) {
-    return (rig.source.fx / rig.source.width * source_width) /
-           (rig.reference.fx / rig.reference.width * level.width);
+    const double source = source_width / static_cast<double>(rig.source.width);
+    const double reference = level.width / static_cast<double>(rig.reference.width);
+    return rig.source_density().x() * source / reference;
 }
 
 // A level without its pairs: its sizes, for sources of the given size at most.

@@ -1,7 +1,7 @@
 """From sparse or semi-dense depth to dense, along the edges of the reference image.
 
-`bench/depth_completion.py` compares `complete` with others; docs/inputs_measured.md has the
-figures.
+`bench/accuracy/depth_completion.py` compares `complete` with others; docs/inputs_measured.md has
+the figures.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Stereo depth beside the truth (Middlebury motorcycle), lidar points removed as hidden (KITTI)."""
+"""Stereo depth beside the truth (Middlebury motorcycle); lidar points removed as hidden (KITTI)."""
 
 import time
 from pathlib import Path

@@ -1,9 +1,9 @@
-"""Which frames to calibrate on: the informed choice beside the random one, on the night rig.
+"""Which frames to calibrate on: chosen by their content or drawn blindly, on the night rig.
 
-Of the 32 frames to fit on, 8 and then 16 are chosen with ten seeds and calibrated on; each rig is
-judged on the 8 held-out frames (sorted, every fifth from the fifth). The footage of a seed is
-`--footage` frames drawn from the 32 (both ways choose from the same), so that the informed choice
-too has something to draw.
+8 and then 16 of the 32 frames to fit on are chosen with ten seeds and calibrated on; each rig is
+judged on the 8 held-out frames (sorted, every fifth from the fifth). Both ways choose from the same
+frames: all 32, or `--footage` of them drawn by the seed, so that more seeds differ for the informed
+choice too, which looks at every frame of so little footage.
 """
 
 import argparse
@@ -11,16 +11,13 @@ import random
 from functools import cache
 
 import numpy as np
-from common import data, machine
+from common import machine
 from figures import figure
+from night import NightRig
 
-import xcalib
 from xcalib._core import draw_frames
 from xcalib.choose import choose_informed
-from xcalib.depth import FolderDepth
 from xcalib.evaluate import evaluate
-from xcalib.footage import ImageFiles
-from xcalib.frames import list_files
 
 
 def main() -> None:
@@ -30,35 +27,29 @@ def main() -> None:
     parser.add_argument("--footage", type=int, default=32, help="frames to choose from, of the 32")
     args = parser.parse_args()
     print(machine())
-    folder = data("lynred_night")
-    if folder is None:
+    night = NightRig.open()
+    if night is None:
         return
-    visible = list_files(folder / "visible")
-    references, sources = ImageFiles(visible), ImageFiles(list_files(folder / "thermal"))
-    depth = FolderDepth(folder / "depth_filled", visible)
-    held = list(range(4, len(visible), 5))
-    fit = [i for i in range(len(visible)) if i not in held]
+
+    def frame(name: str):
+        return night.visible(name), night.thermal(name), night.filled(name)
 
     @cache
-    def read(i: int):
-        return references[i], sources[i], depth(i, references[i])
-
-    @cache
-    def judged(frames: tuple[int, ...]) -> tuple[float, float, bool]:
-        result = xcalib.calibrate(*zip(*map(read, frames), strict=True))
-        scores = evaluate(result.rig, *zip(*map(read, held), strict=True)).registered
+    def judged(names: tuple[str, ...]) -> tuple[float, float, bool]:
+        result = night.fit(night.filled, names)
+        scores = evaluate(result.rig, *zip(*map(frame, night.held), strict=True)).registered
         return scores["patch_median"], scores["patch_under_2px"], result.converged
 
     for chosen in args.chosen:
-        found: dict[str, list[tuple[int, ...]]] = {"spread": [], "informed": []}
+        found: dict[str, list[tuple[str, ...]]] = {"spread": [], "informed": []}
         for seed in range(args.seeds):
-            footage = sorted(random.Random(seed).sample(fit, args.footage))
+            footage = sorted(random.Random(seed).sample(night.fitted, args.footage))
             spread = draw_frames(len(footage), chosen, seed)
-            choice = choose_informed(len(footage), chosen, seed, lambda i, f=footage: read(f[i]))
+            choice = choose_informed(len(footage), chosen, seed, lambda i, f=footage: frame(f[i]))
             for name, indices in (("spread", spread), ("informed", choice.indices)):
                 found[name].append(tuple(footage[i] for i in indices))
         for name, sets in found.items():
-            results = np.array([judged(frames) for frames in sets], float)
+            results = np.array([judged(names) for names in sets], float)
             median, share, trusted = results.T
             label = f"{chosen} frames, {name}"
             figure(f"{label}: patch residual, mean of the draws", median.mean(), "px")

@@ -1,22 +1,20 @@
-"""`register` on many frames: memory, frames a second, where the time goes, and what overlap gains.
+"""`register` on many frames: frames a second, memory, where the time goes, what overlapping gains.
 
-Frames are written first, to a folder of PNG files or to videos. Then all of them are registered,
-memory being sampled; and, for the gain, short stretches one after the other, stage after stage on
-one thread and overlapped, in turns. The registrar has all cores in both.
-
-    python bench/stream.py [--frames 10000] [--width 640] [--kind folder|video] [--work FOLDER]
+Frames are written first, to a folder of PNG files or to videos. For the gain, short stretches are
+registered in turns, with the stages one after the other on one thread and with them overlapped; the
+registrar has all cores in both. Then all frames are registered while memory is sampled.
 """
 
 import argparse
 import shutil
 import tempfile
 import threading
-import time
 from pathlib import Path
 
 import cv2
 import numpy as np
 from common import machine
+from figures import figure, spread
 
 from xcalib import Rig, synthetic
 from xcalib.footage import Picked
@@ -79,23 +77,23 @@ def write(folder: Path, rig: Rig, count: int, kind: str) -> tuple[Path, Path]:
     return streams[0], streams[1]
 
 
-def part(frames: Frames, first: int, count: int) -> Frames:
+def stretch(frames: Frames, first: int, count: int) -> Frames:
     indices = list(range(first, first + count))
     depth = PickedDepth(frames.depth, indices)
     return Frames(Picked(frames.references, indices), Picked(frames.sources, indices), depth)
 
 
-def told(result: Registration) -> str:
-    busy = ", ".join(f"{name} {100 * share:.0f} %" for name, share in result.busy.items())
-    return f"{result.frames / result.seconds:.1f} frames/s; busy: {busy}"
+def busy(label: str, result: Registration) -> None:
+    for name, share in result.busy.items():
+        figure(f"{label}: {name} busy", 100 * share, "%")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--frames", type=int, default=10000)
     parser.add_argument("--width", type=int, default=640)
     parser.add_argument("--kind", choices=["folder", "video"], default="folder")
-    parser.add_argument("--work", type=Path)
+    parser.add_argument("--work", type=Path, help="where a folder for the frames is made")
     given = parser.parse_args()
     print(machine())
     rig = synthetic.demo_rig()
@@ -112,23 +110,21 @@ def main() -> None:
         rates: dict[bool, list[float]] = {True: [], False: []}
         last: dict[bool, Registration] = {}
         for turn in range(ROUNDS):
-            few = part(frames, (turn * STRETCH) % max(1, len(frames) - STRETCH), STRETCH)
+            few = stretch(frames, (turn * STRETCH) % max(1, len(frames) - STRETCH), STRETCH)
             for overlapped in (True, False) if turn % 2 else (False, True):
                 options = RegistrationOptions(overwrite=True)
                 result = run_registration(few, rig, out, options, None, True, overlapped)
                 rates[overlapped].append(result.frames / result.seconds)
                 last[overlapped] = result
+        for overlapped, label in ((False, "one after the other"), (True, "overlapped")):
+            spread(f"{label}: frames a second", rates[overlapped])
+            busy(label, last[overlapped])
         ratios = np.array(rates[True]) / np.array(rates[False])
-        print(f"one after the other: {told(last[False])}")
-        print(f"overlapped:          {told(last[True])}")
-        print(
-            f"overlap gains {np.median(ratios):.2f} times"
-            f" ({ratios.min():.2f}-{ratios.max():.2f}) in {ROUNDS} turns of {STRETCH} frames"
-        )
+        spread(f"overlapping gains, times, in {ROUNDS} turns of {STRETCH} frames", ratios)
         if out.is_dir():
             shutil.rmtree(out)
 
-        samples: list[float] = []
+        samples = [resident()]
         over = threading.Event()
 
         def sample() -> None:
@@ -137,20 +133,18 @@ def main() -> None:
 
         sampler = threading.Thread(target=sample)
         sampler.start()
-        start = time.perf_counter()
         try:
             result = run_registration(frames, rig, out, RegistrationOptions(overwrite=True))
         finally:
             over.set()
             sampler.join()
-        print(f"all, in {time.perf_counter() - start:.0f} s: {told(result)}")
-        print("memory, median over a twentieth of the run each [MB]:")
-        print(" ".join(f"{np.median(part):.0f}" for part in np.array_split(samples, 20)))
-        third = len(samples) // 3
-        print(
-            f"largest in the first, middle and last third: {max(samples[:third]):.0f},"
-            f" {max(samples[third:-third]):.0f}, {max(samples[-third:]):.0f} MB"
-        )
+        label = f"all {result.frames} frames"
+        figure(f"{label}: frames a second", result.frames / result.seconds)
+        busy(label, result)
+        parts = np.array_split(samples, min(20, len(samples)))
+        for which, index in (("first", 0), ("middle", len(parts) // 2), ("last", -1)):
+            figure(f"memory over the {which} twentieth of the run", np.median(parts[index]), "MB")
+        figure("memory, at most", max(samples), "MB")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Random synthetic rigs, exact depth, 8 frames, no initial guess: how many are found.
+"""Random rendered rigs, exact depth, 8 frames, no initial guess: how many are found.
 
 Reference HFoV 30-90 deg, source to reference ratio 0.5-2, optical axes off by up to 30 % of the
 width, roll within 5 deg, baseline up to 0.5 m. Every third street is a night.

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+import xcalib
 from xcalib import metrics
 
 EROSION = np.ones((5, 5), np.uint8)
@@ -14,8 +15,20 @@ METRICS = {"NEC": metrics.nec, "GC": metrics.gc, "SSIM": metrics.ssim, "NCC": me
 
 
 @dataclass(frozen=True)
+class View:
+    """A registered frame as it is judged: gray images (H, W) in [0, 1] on the reference's grid."""
+
+    reference: np.ndarray
+    unregistered: np.ndarray
+    """The source only resized."""
+    registered: np.ndarray
+    inside: np.ndarray
+    """Nonzero where a pixel is judged."""
+
+
+@dataclass(frozen=True)
 class Judged:
-    """One registered frame."""
+    """Scores of one registered frame."""
 
     before: dict[str, float]
     """Of the source only resized, over the same pixels."""
@@ -39,6 +52,31 @@ def sampled(source: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return cv2.remap(source, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), inside
 
 
+def counted_map(registrar: xcalib.Registrar, source: np.ndarray, depth: np.ndarray):
+    """A registrar's map, and where it counts: seen, not hidden, of known depth."""
+    at = registrar.map(depth)
+    _, mask = registrar.register(source, depth)
+    return at, mask == 0
+
+
+def scored(view: View, epe: np.ndarray | None = None) -> Judged:
+    plain, inside = view.unregistered, view.inside
+    epe = np.empty(0, np.float32) if epe is None else epe
+    whole = {name: score(view.reference, plain) for name, score in METRICS.items()}
+    if inside.mean() < 0.01:  # nothing is left to judge: a failure that must not vanish
+        nothing = dict.fromkeys(METRICS, 0.0)
+        empty = np.empty((0, 2), np.float32)
+        return Judged(whole, nothing, metrics.PatchResidual(empty, empty), 0.0, whole, epe)
+    return Judged(
+        {name: score(view.reference, plain, inside) for name, score in METRICS.items()},
+        {name: score(view.reference, view.registered, inside) for name, score in METRICS.items()},
+        metrics.patch_residual(view.reference, view.registered, inside),
+        float(inside.mean()),
+        whole,
+        epe,
+    )
+
+
 def judge(
     reference: np.ndarray,
     source: np.ndarray,
@@ -53,23 +91,11 @@ def judge(
         inside &= mask
     inside = cv2.erode(inside.astype(np.uint8), EROSION, borderValue=0) > 0
     plain = cv2.resize(source, reference.shape[::-1])
-    whole = {name: score(reference, plain) for name, score in METRICS.items()}
-    epe = np.empty(0, np.float32)
+    epe = None
     if truth is not None:
         error = np.linalg.norm(at - truth, axis=-1) * scale
         epe = error[inside & np.isfinite(error)]
-    empty = np.empty((0, 2), np.float32)
-    if inside.mean() < 0.01:  # nothing is left to judge: a failure that must not vanish
-        nothing = dict.fromkeys(METRICS, 0.0)
-        return Judged(whole, nothing, metrics.PatchResidual(empty, empty), 0.0, whole, epe)
-    return Judged(
-        {name: score(reference, plain, inside) for name, score in METRICS.items()},
-        {name: score(reference, registered, inside) for name, score in METRICS.items()},
-        metrics.patch_residual(reference, registered, inside),
-        float(inside.mean()),
-        whole,
-        epe,
-    )
+    return scored(View(reference, plain, registered, inside), epe)
 
 
 def systematic(patches: list[metrics.PatchResidual], size: tuple[int, int]) -> float:
@@ -90,27 +116,40 @@ def systematic(patches: list[metrics.PatchResidual], size: tuple[int, int]) -> f
     return float(np.median(lengths)) if lengths else float("nan")
 
 
-def gain(judged: list[Judged], name: str) -> float:
-    """Change of the mean score by registration, relative."""
-    before, after = (
-        np.nanmean([getattr(j, of)[name] for j in judged]) for of in ("before", "after")
-    )
-    return float((after - before) / abs(before))
+def mean_score(judged: list[Judged], of: str, name: str) -> float:
+    """Over the frames; `of`: before, after or whole."""
+    return float(np.nanmean([getattr(j, of)[name] for j in judged]))
+
+
+def gain(judged: list[Judged], name: str, over: str = "before") -> float:
+    """Change of the mean score by registration, relative to `before` or `whole`."""
+    before, after = mean_score(judged, over, name), mean_score(judged, "after", name)
+    return (after - before) / abs(before)
+
+
+def patch_lengths(judged: list[Judged]) -> np.ndarray:
+    """Lengths of the patch residual over all frames [px]."""
+    return np.concatenate([j.patches.norms for j in judged])
+
+
+def patch_cells(judged: list[Judged]) -> list[str]:
+    """Median of the patch residual [px], and its share under 2 px; dashes where no patch is."""
+    lengths = patch_lengths(judged)
+    if not len(lengths):
+        return ["-", "-"]
+    return [f"{np.median(lengths):.2f}", f"{np.mean(lengths < 2):.0%}"]
 
 
 SCORE_COLUMNS = ["NEC", "GC", "SSIM", "NCC", "patch [px]", "< 2 px", "systematic [px]", "valid"]
 
 
-def scores(judged: list[Judged], size: tuple[int, int]) -> list[str]:
+def score_cells(judged: list[Judged], size: tuple[int, int]) -> list[str]:
     """Cells of `SCORE_COLUMNS`."""
     found = []
     for name in METRICS:
-        value = np.nanmean([j.after[name] for j in judged])
         change = f"{gain(judged, name):+.0%}".replace("-0%", "+0%")
-        found.append(f"{value:.3f} ({change})")
-    norms = np.concatenate([j.patches.norms for j in judged])
-    found.append(f"{np.median(norms):.2f}" if len(norms) else "-")
-    found.append(f"{np.mean(norms < 2):.0%}" if len(norms) else "-")
+        found.append(f"{mean_score(judged, 'after', name):.3f} ({change})")
+    found += patch_cells(judged)
     found.append(f"{systematic([j.patches for j in judged], size):.2f}")
     found.append(f"{np.mean([j.valid for j in judged]):.0%}")
     return found

@@ -1,8 +1,10 @@
-"""One 1280x960 frame from a 640x512 source, against what one would write instead, and a plain copy.
+"""Registering a frame, beside numpy + cv2.remap, PyTorch and a plain copy.
+
+One of 1280x960 from a source of 640x512.
 
 The depth changes with every frame. Each round runs every contestant once, on the same depth; a
-ratio is the median over the rounds of the ratio within a round, so that the machine's mood cancels.
-All write to arrays that exist, where their interface lets them. Threads: one, unless said.
+ratio is the median over the rounds of the ratio within a round, so that a busy machine slows both.
+All write to existing arrays where their interface allows it. One thread unless a name says more.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""Built-in patch flow: its error where it is known, its time, and what it sees on a real rig.
+"""The built-in patch flow: its error where that is known, its time, and a real rig.
 
 Rendered streets: the source warped by the true rig turned so that it is 0-12 px off. Aligned real
 pairs (good to 1-2 px): shifted by known amounts. The night rig: fitted, then flow beside the patch
@@ -10,9 +10,9 @@ import time
 
 import cv2
 import numpy as np
-from common import data, machine
+from common import data, gray, machine
 from figures import figure, spread
-from night import SIZE, NightRig, gray
+from night import SIZE, NightRig
 
 import xcalib
 from xcalib import metrics, synthetic
@@ -55,18 +55,18 @@ class Tally:
 
     def __init__(self) -> None:
         self.errors: list[np.ndarray] = []
-        self.told = self.pixels = 0
+        self.confident = self.pixels = 0
 
     def add(self, flow, confidence, truth, valid) -> None:
         known = valid & np.isfinite(truth[..., 0])
-        told = known & (confidence >= CONFIDENT)
-        self.errors.append(np.linalg.norm(flow - truth, axis=-1)[told])
-        self.told += int(told.sum())
+        confident = known & (confidence >= CONFIDENT)
+        self.errors.append(np.linalg.norm(flow - truth, axis=-1)[confident])
+        self.confident += int(confident.sum())
         self.pixels += int(known.sum())
 
     def report(self, label: str) -> None:
         e = np.concatenate(self.errors)
-        figure(f"{label}: confident pixels", 100 * self.told / self.pixels, "%")
+        figure(f"{label}: confident pixels", 100 * self.confident / self.pixels, "%")
         if e.size:
             figure(f"{label}: median error", np.median(e), "px")
             figure(f"{label}: under 1 px", 100 * np.mean(e < 1), "%")
@@ -104,7 +104,7 @@ def shifted_pairs(count: int) -> None:
         for i, name in enumerate(names):
             visible = gray(cv2.imread(str(folder / "visible" / name)))
             thermal = gray(cv2.imread(str(folder / "thermal" / name), cv2.IMREAD_UNCHANGED))
-            angle = 2.4 * i  # rounds the circle
+            angle = 2.4 * i  # all directions
             dx, dy = offset * np.cos(angle), offset * np.sin(angle)
             size = thermal.shape[::-1]
             move = np.float32([[1, 0, dx], [0, 1, dy]])
@@ -113,7 +113,7 @@ def shifted_pairs(count: int) -> None:
             flow, confidence = patch_flow(visible, warped, mask)
             shift = np.float32([dx, dy])
             against_truth.add(flow, confidence, np.broadcast_to(shift, flow.shape), mask)
-            # What the pair's own misalignment is does not change by a shift.
+            # A shift does not change the pair's own misalignment.
             own, sure = unshifted.setdefault(name, (flow, confidence))
             against_own.add(flow, confidence, own + shift, mask & (sure >= CONFIDENT))
         label = f"aligned real pairs ({len(names)}), shifted by {offset} px"
@@ -127,22 +127,19 @@ def night_rig() -> None:
     if night is None:
         return
 
-    def depth(name: str) -> np.ndarray:
-        return night.depth("depth_filled", name)
-
-    views = list(night.views(night.fit(depth).rig, depth))
+    views = list(night.views(night.fit(night.filled).rig, night.filled))
     lengths, patches, shares, both = [], [], [], []
     for view in views:
         flow, confidence = patch_flow(view.reference, view.registered, view.inside)
-        told = (confidence >= CONFIDENT) & (view.inside > 0)
-        lengths.append(np.linalg.norm(flow, axis=-1)[told])
-        shares.append(told.sum() / view.inside.sum())
+        confident = (confidence >= CONFIDENT) & (view.inside > 0)
+        lengths.append(np.linalg.norm(flow, axis=-1)[confident])
+        shares.append(confident.sum() / view.inside.sum())
         residual = metrics.patch_residual(view.reference, view.registered, view.inside)
         patches.append(residual.norms)
         for (x, y), shift in zip(
             residual.centers.round().astype(int), residual.shifts, strict=True
         ):
-            if told[y, x]:
+            if confident[y, x]:
                 both.append(np.linalg.norm(flow[y, x] - shift))
     length, patch = np.concatenate(lengths), np.concatenate(patches)
     label = f"night rig, {len(views)} held-out frames"

@@ -1,4 +1,4 @@
-"""Filling depth: hide known pixels, fill them, compare. Prints one table.
+"""Filling depth: known pixels are hidden, filled and compared, by five methods.
 
 Night rig (semi-dense stereo, 583x473, 8 frames): a random tenth of the known pixels, and 40x40 px
 blocks. KITTI (lidar, 3 frames): a random tenth of the points. The error is |dz| / z of the hidden

@@ -1,4 +1,4 @@
-"""Does steadied depth help? A rendered drive of 24 frames, 0.3 m apart, with noise on its depth."""
+"""Noise and flicker of depth, as it is and steadied: a drive of 24 frames, 0.3 m apart."""
 
 import time
 
@@ -6,25 +6,14 @@ import cv2
 import numpy as np
 from common import machine
 from figures import figure
+from rendered import Drive
 
-import xcalib
 from xcalib import synthetic
 from xcalib.depth.conditioning import SteadyDepth
 
 
-class Drive(synthetic.Street):
-    """A street passed at 0.3 m a frame, where the street's own frames are 6 m apart."""
-
-    def pose(self, index: float) -> tuple[np.ndarray, np.ndarray]:
-        return super().pose(index / 20)
-
-
-def small_rig() -> xcalib.Rig:
-    return synthetic.demo_rig().resized(480, 360, 320, 256)
-
-
 def steady(noise: float, smooth: bool) -> None:
-    drive = Drive(small_rig(), num_frames=24, seed=3)
+    drive = Drive(synthetic.demo_rig().resized(480, 360, 320, 256), 24, 0.3, seed=3)
     frames = [drive.frame(i) for i in range(24)]
     rng = np.random.default_rng(1)
 

@@ -1,4 +1,4 @@
-"""What a calibration takes: against the paper's Adam in PyTorch, by frames, by pixels, and where.
+"""Time and memory of a calibration: beside the paper's Adam in PyTorch, by frames, by pixels.
 
 Two threads throughout; every run is a process of its own, which measures the fit alone: frames are
 in memory, modules loaded. The peer takes the published 120 steps (15 epochs of 32 frames by 4)
@@ -6,8 +6,8 @@ without its flow network, which would only add to its time; since nothing but it
 the rig rendered for the comparison lies 7 px from where it starts. Ours starts from nothing and
 searches. Both results are judged by both objectives.
 
-    calibration_time.py                       all of it
-    calibration_time.py --only peer|frames|pixels
+    python bench/run.py calibration_time                               all of it
+    python bench/run.py calibration_time -- --only peer|frames|pixels
 """
 
 import argparse
@@ -20,21 +20,22 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from common import ROOT, machine
+from common import ROOT, machine, median_error
 from figures import figure, skipped, spread
 from night import NightRig
+from rendered import Rendered, mapped_array, rendered
 
 import xcalib
-from xcalib import metrics, synthetic
+from xcalib import synthetic
 
 CACHE = ROOT / "build" / "bench"
+ARRAYS = ("references", "sources", "depths")
 THREADS = 2
-PARTS = ("prepare", "search", "warp", "jacobian", "solver")
 Sets = tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]
 
 
-def drive(width: int, count: int) -> tuple[xcalib.Rig, Path]:
-    """A rendered drive of a rig near the paper's start, kept: reference, source, depth .npy."""
+def drive(width: int, count: int) -> Rendered:
+    """A rendered drive of a rig near the paper's start."""
     height, source = width * 3 // 4, (width, width * 4 // 5)
     rig = synthetic.random_rig(
         2,
@@ -45,13 +46,7 @@ def drive(width: int, count: int) -> tuple[xcalib.Rig, Path]:
         max_baseline=0.15,
         max_roll_deg=1,
     )
-    folder = CACHE / f"drive-{width}-{count}"
-    if not (folder / "depth.npy").is_file():
-        folder.mkdir(parents=True, exist_ok=True)
-        frames = list(synthetic.render(rig, num_frames=count, seed=2))
-        for name in ("reference", "source", "depth"):  # depth, the last, makes the folder whole
-            np.save(folder / f"{name}.npy", np.stack([getattr(f, name) for f in frames]))
-    return rig, folder
+    return rendered(rig, count, seed=2)
 
 
 def night_frames() -> Path | None:
@@ -60,22 +55,22 @@ def night_frames() -> Path | None:
     if night is None:
         return None
     folder = CACHE / "night"
-    if not (folder / "depth.npy").is_file():
+    if not (folder / "depths.npy").is_file():
         folder.mkdir(parents=True, exist_ok=True)
         names = night.fitted
         size = (640, round(640 * 946 / 1166))
         visible = [cv2.resize(night.visible(n), size, interpolation=cv2.INTER_AREA) for n in names]
-        np.save(folder / "reference.npy", np.stack(visible))
-        np.save(folder / "source.npy", np.stack([night.thermal(n) for n in names]))
-        depths = [night.depth("depth_filled", n) for n in names]
+        np.save(folder / "references.npy", np.stack(visible))
+        np.save(folder / "sources.npy", np.stack([night.thermal(n) for n in names]))
+        depths = [night.filled(n) for n in names]
         depths = [cv2.resize(d, size, interpolation=cv2.INTER_NEAREST) for d in depths]
-        np.save(folder / "depth.npy", np.stack(depths))
+        np.save(folder / "depths.npy", np.stack(depths))  # the last: with it the folder is whole
     return folder
 
 
 def read(folder: Path, count: int, width: int | None = None) -> Sets:
     """The first frames; smaller, where a width is given."""
-    mapped = [np.load(folder / f"{n}.npy", mmap_mode="r") for n in ("reference", "source", "depth")]
+    mapped = [mapped_array(folder / f"{name}.npy") for name in ARRAYS]
     factor = 1.0 if width is None else width / mapped[0].shape[2]
     how = (cv2.INTER_AREA, cv2.INTER_AREA, cv2.INTER_NEAREST)
     sets: list[list[np.ndarray]] = [[], [], []]
@@ -97,7 +92,7 @@ def memory() -> tuple[float, float]:
 
 
 class Clock:
-    """Time, and the processor time of all threads, which tells more where others work too."""
+    """Time, and the processor time of all threads: the steadier one on a shared machine."""
 
     def __init__(self) -> None:
         self.start = time.perf_counter(), time.process_time()
@@ -133,22 +128,10 @@ def run(contestant: str, folder: Path, count: int, width: int | None, rig_file: 
         **taken,
         "memory": memory()[1],
         "memory_before": before,
-        "parts": parts(report),
+        "parts": dict(report.time),
         "converged": result.converged,
         "iterations": sum(level.iterations for level in report.levels),
     }
-
-
-def parts(report: xcalib.CalibrationReport) -> dict[str, float]:
-    """Where the time went [s]: what the report tells of it."""
-    told = getattr(report, "time", None)
-    if told is not None:
-        return {name: float(told[name]) for name in PARTS if name in told}
-    found = {"search": report.search_seconds}
-    for level in report.levels:
-        name = f"level 1/{level.factor}, stage {level.stage}"
-        found[name] = found.get(name, 0.0) + level.seconds
-    return found
 
 
 def in_process(contestant: str, folder: Path, count: int, width: int | None = None) -> dict:
@@ -224,8 +207,7 @@ def against_peer(name: str, folder: Path, truth: xcalib.Rig | None, rounds: int)
     if truth is None:
         return
     for who, rig in rigs.items():
-        maps = [metrics.end_point_error(rig, truth, depth) for depth in sets[2]]
-        figure(f"{name}: end-point error, {who}", float(np.nanmedian(np.stack(maps))), "px")
+        figure(f"{name}: end-point error, {who}", median_error(rig, truth, sets[2]), "px")
 
 
 # -- By frames and by pixels ---------------------------------------------------------------------
@@ -237,7 +219,7 @@ def exponent(sizes: list[float], seconds: list[float]) -> float:
 
 
 def series(label: str, folder: Path, runs: list[tuple[int, int]], by: str, rounds: int) -> None:
-    """`runs`: frames and width. Every round has them all once, so that none has the quiet hour."""
+    """`runs`: frames and width. Every round has them all once: a busy time meets all alike."""
     taken: list[list[float]] = [[] for _ in runs]
     processor: list[list[float]] = [[] for _ in runs]
     last: list[dict] = [{} for _ in runs]
@@ -281,19 +263,18 @@ def main() -> None:
         return
     print(machine())
     CACHE.mkdir(parents=True, exist_ok=True)
-    truth, folder = drive(640, 64)
+    scene = drive(640, 64)
     if args.only in (None, "peer"):
-        against_peer("rendered", folder, truth, args.rounds)
+        against_peer("rendered", scene.folder, scene.rig, args.rounds)
         night = night_frames()
         if night is not None:
             against_peer("night rig", night, None, 1)
     if args.only in (None, "frames"):
         runs = [(count, 640) for count in (8, 16, 32, 64)]
-        series("by frames", folder, runs, "frames", args.rounds)
+        series("by frames", scene.folder, runs, "frames", args.rounds)
     if args.only in (None, "pixels"):
-        _, large = drive(1280, 16)
         runs = [(16, width) for width in (320, 640, 960, 1280)]
-        series("by pixels", large, runs, "pixels", args.rounds)
+        series("by pixels", drive(1280, 16).folder, runs, "pixels", args.rounds)
 
 
 if __name__ == "__main__":
