@@ -80,6 +80,8 @@ struct Rig {
 
     Eigen::Matrix3d R() const { return source_from_reference.rotation.toRotationMatrix(); }
     const Eigen::Vector3d& t() const { return source_from_reference.translation; }
+    // Source pixels of (X/Z, Y/Z, 1) in the source camera, mirrored if its image is.
+    Eigen::Matrix3d source_K() const;
 
     // Source pixels to a reference pixel, of something far on the optical axes, along x and y.
     Eigen::Vector2d source_density() const {

@@ -117,6 +117,12 @@ void Rig::validate() const {
     if (relative_depth) relative_depth->validate("relative_depth");
 }
 
+Eigen::Matrix3d Rig::source_K() const {
+    Eigen::Matrix3d k = source.K();
+    if (source_mirrored) k.col(0) = -k.col(0);
+    return k;
+}
+
 Rig with_flipped_source(const Rig& rig) {
     Rig out = rig;
     out.source = rig.source.flipped();
@@ -165,7 +171,7 @@ Rig turn_source(const Rig& rig, const Eigen::Vector3d& rotation) {
 }
 
 Eigen::Matrix3d infinite_homography(const Rig& rig) {
-    return rig.source.K() * rig.R() * rig.reference.K().inverse();
+    return rig.source_K() * rig.R() * rig.reference.K().inverse();
 }
 
 Eigen::Quaterniond rotation_of(const Eigen::Matrix3d& R) {

@@ -1,5 +1,6 @@
 #include "geometry/projector.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -76,7 +77,7 @@ HWY_EXPORT(seen_row);
 }  // namespace
 
 Projector::Projector(const Rig& rig)
-    : to_image{infinite_homography(rig), rig.source.K() * rig.t()},
+    : to_image{infinite_homography(rig), rig.source_K() * rig.t()},
       to_camera{rig.R() * rig.reference.K().inverse(), rig.t()},
       to_ray(rig.reference.K().inverse()), source_width(rig.source.width),
       source_height(rig.source.height) {}
@@ -100,7 +101,7 @@ float Projector::least_depth(int y, int width) const {
 Eigen::Vector2d transfer(const Rig& rig, double x, double y, double depth) {
     if (depth > 0) {
         const Eigen::Vector3d point = rig.R() * unproject(rig.reference, x, y, depth) + rig.t();
-        if (point.z() > kNearestZ) return project(rig.source, point);
+        if (point.z() > kNearestZ) return (rig.source_K() * point).hnormalized();
     }
     return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
 }
