@@ -1,13 +1,18 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from numpy import float32, float64, intp, uint8
 from numpy.typing import ArrayLike, NDArray
 
+from .depth import DepthProvider
+
 class InputError(ValueError):
     """Input that cannot be used; the message names the file or argument and what was expected."""
+
+class DecodeError(InputError):
+    """A file that cannot be decoded: truncated, or not what its name says."""
 
 class Pinhole:
     """A pinhole camera, Eq. (intrinsic) of the paper.
@@ -544,14 +549,6 @@ def times_of_names(names: Sequence[str]) -> list[float] | None:
     fraction) and they rise; None otherwise.
     """
 
-def times_of_table(text: str, table: str, names: Sequence[str]) -> list[float]:
-    """Seconds of each name, from the text of a table of `name timestamp` lines.
-
-    Names with or without suffix, then a comma, semicolon or blanks; lines of other kinds may
-    only come first, # comments anywhere. Times of 19, 16 or 13 digits are nano-, micro- and
-    milliseconds, others seconds. Raises InputError that begins with table, the file's name.
-    """
-
 class OffsetEstimate:
     """A clock offset, and what speaks for it."""
     def __init__(
@@ -580,28 +577,6 @@ class OffsetEstimate:
     def line(self) -> str:
         """In one line."""
 
-def motion_edges(image: NDArray[Any]) -> NDArray[float32]:
-    """Magnitude of the gradient of a small gray copy, (h, 160) float32: about 1 on an edge
-    whatever the gain. Pixels that are not finite count as black.
-    """
-
-def estimate_offset(
-    references: Sequence[float],
-    sources: Sequence[float],
-    reference_edges: Callable[[int], NDArray[float32] | None],
-    source_edges: Callable[[int], NDArray[float32] | None],
-    max_offset: float = 2.0,
-    max_frames: int = 1500,
-) -> OffsetEstimate:
-    """A constant offset between the clocks of two streams, neither registered.
-
-    references, sources: times of their frames [s], never falling, each on its own clock.
-    reference_edges, source_edges: motion_edges() of frame i, None where it cannot be decoded.
-    max_offset: the largest looked for, either way [s]; also at most a third of the footage.
-    max_frames: references asked for at most, from the middle of the footage. Raises
-    InputError where the times do not overlap.
-    """
-
 class RefinedOffset:
     """A clock offset chosen by how well frames register, and what speaks for it."""
     @property
@@ -618,76 +593,14 @@ class RefinedOffset:
     def line(self) -> str:
         """In one line."""
 
-def offsets_around(
-    guess: float, references: Sequence[float], sources: Sequence[float]
-) -> list[float]:
-    """Candidates for refine_offset(), from the times of both streams [s]: 6 frames of the faster
-    one either way, in quarters [s].
-    """
-
-class RegisteredNec:
-    """NEC of a reference and a source frame, registered."""
-    def __init__(self, rig: Rig) -> None:
-        """Rescaled to the frames."""
-    def __call__(self, reference: NDArray[Any], source: NDArray[Any], depth: NDArray[Any]) -> float:
-        """In [0, 1]; 0 where no pixel is valid. Frames of one size; depth (h, w) float32 [m], 0
-        unknown.
-        """
-
-def refine_offset(
-    references: Sequence[float],
-    sources: Sequence[float],
-    candidates: Sequence[float],
-    score: Callable[[int, int], float | None],
-    max_frames: int = 12,
-) -> RefinedOffset:
-    """Chooses among candidate offsets [s], rising, around a guess in their middle.
-
-    references, sources: times of their frames [s]. score: the RegisteredNec of a reference
-    and a source frame, by their indices, None where one cannot be decoded. Of the candidates
-    that differ from the best by less than the frames do among each other (two standard errors
-    of the mean), the one nearest to the middle is taken. max_frames: of the slower stream,
-    spread over the footage. Raises InputError without candidates.
-    """
-
 def fingerprint(data: str | bytes) -> str:
     """16 hexadecimal digits of a text, or of bytes: it tells changes by accident, not by intent."""
-
-def rig_fingerprint(rig: Rig) -> str:
-    """The fingerprint() of all numbers of a rig."""
 
 def absolute_path(path: str | PathLike[str]) -> Path:
     """A path from the root, without `.` and empty parts; `..` and links stay."""
 
-def file_stamp(path: str | PathLike[str]) -> list[str]:
-    """Where a file is, its size, and the time of its last change; of a folder, those of all
-    files in it. A path that cannot be read is itself.
-    """
-
-def median_period(times: Sequence[float]) -> float:
-    """Median distance of times [s]; 0 for a single one."""
-
-class FrameList:
-    """The frames of a camera, without their pixels."""
-    def __init__(
-        self,
-        names: Sequence[str],
-        where: Sequence[str],
-        paths: Sequence[str | PathLike[str]] = ...,
-        times: Sequence[float] | None = None,
-    ) -> None:
-        """names: without suffix; where: for messages; paths: of image files, none for other
-        frames; times: seconds, never falling, or None.
-        """
-
 class Pairing:
     """Indices into two streams, and how they were found."""
-    def __init__(
-        self,
-        method: str,
-        references: Sequence[int] | NDArray[intp],
-        sources: Sequence[int] | NDArray[intp],
-    ) -> None: ...
     @property
     def method(self) -> str:
         """name, order or time."""
@@ -721,33 +634,6 @@ def pair_times(
     behind the last one chosen. By default max_gap is half the larger median period. Raises
     InputError where no two are near.
     """
-
-def pair_frames(
-    references: FrameList,
-    sources: FrameList,
-    method: str = "auto",
-    offset: float = 0.0,
-    max_gap: float | None = None,
-) -> Pairing:
-    """Pairs two FrameLists.
-
-    method: name (pair_files), order (first with first, of equally many), time (pair_times),
-    or auto: by time where both have times, else files by name, and others in order. offset
-    [s]: reference time t is source time t + offset; not 0: by time. Raises InputError.
-    """
-
-def match_depths(references: FrameList, used: Sequence[int], depths: FrameList) -> list[int]:
-    """The depth map, as an index into depths, of each of the references used.
-
-    Files under the names of the frames are theirs, and others are left over. Else the nearest
-    in time within half a period of the references, where both tell it; else by pair_files, of
-    all references or of those in use. Raises InputError.
-    """
-
-def nearest_depths(
-    references: FrameList, used: Sequence[int], depths: Sequence[float], where: str
-) -> list[int]:
-    """The nearest depth map in time, as match_depths() does it; depths: their times [s]."""
 
 def frames_to_look_at(count: int, max_frames: int, seed: int) -> list[int]:
     """Indices of the frames, of count, that a choice of max_frames looks at: four of each
@@ -823,12 +709,6 @@ class ColorMap:
 
 def known_color_maps() -> list[ColorMap]:
     """OpenCV's, and `iron`."""
-
-def known_color_map(name: str) -> ColorMap:
-    """Raises InputError that lists the names."""
-
-def frames_to_recognise_by(count: int) -> list[int]:
-    """A few of count frames, spread over the footage, rising."""
 
 def recognise(images: Sequence[NDArray[Any]]) -> ColorMap | None:
     """The ColorMap of false-colour images of one camera, or None if they are none.
@@ -1013,3 +893,120 @@ def overlay(
     Where the other is not valid (mask (H, W), nonzero where it is) the reference alone is
     shown, in gray.
     """
+
+class Stream:
+    def __init__(self) -> None: ...
+    def __len__(self) -> int: ...
+    @overload
+    def __getitem__(self, index: int) -> NDArray[Any]: ...
+    @overload
+    def __getitem__(self, indices: slice) -> Stream: ...
+    def __iter__(self) -> Iterator[NDArray[Any]]: ...
+    def name(self, index: int) -> str: ...
+    def where(self, index: int) -> str: ...
+    def file(self, index: int) -> Path: ...
+    @property
+    def parallel(self) -> bool: ...
+    @property
+    def times(self) -> NDArray[float64] | None: ...
+    @times.setter
+    def times(self, times: Sequence[float] | NDArray[float64] | None) -> None: ...
+
+class Picked(Stream):
+    def __init__(self, stream: Stream, indices: Sequence[int]) -> None: ...
+
+class Half(Stream):
+    def __init__(self, stream: Stream, half: str) -> None: ...
+
+def read_times(table: str | PathLike[str], stream: Stream) -> list[float]: ...
+def scalar_sources(images: Stream, colormap: str = "auto") -> tuple[Stream, str]: ...
+def pair_streams(
+    references: Stream,
+    sources: Stream,
+    method: str = "auto",
+    offset: float = 0.0,
+    max_gap: float | None = None,
+) -> Pairing: ...
+def match_depths(references: Stream, used: Sequence[int], depths: Stream) -> list[int]: ...
+def nearest_depths(references: Stream, used: Sequence[int], depths: Stream) -> list[int]: ...
+def estimate_offset(
+    references: Stream, sources: Stream, max_offset: float = 2.0, max_frames: int = 1500
+) -> OffsetEstimate: ...
+def offsets_around(guess: float, references: Stream, sources: Stream) -> list[float]: ...
+def refine_offset(
+    rig: Rig,
+    references: Stream,
+    sources: Stream,
+    depth: DepthProvider,
+    candidates: Sequence[float],
+    max_frames: int = 12,
+) -> RefinedOffset: ...
+
+class Pairs:
+    def __init__(
+        self,
+        references: Stream,
+        sources: Stream,
+        method: str = "auto",
+        time_offset: float | None = 0.0,
+        max_gap: float | None = None,
+        reference_times: str | PathLike[str] | None = None,
+        source_times: str | PathLike[str] | None = None,
+        estimate: OffsetEstimate | None = None,
+    ) -> None: ...
+    def refine(self, rig: Rig, open_depth: Callable[[list[int]], DepthProvider]) -> None: ...
+    @property
+    def references(self) -> Stream: ...
+    @property
+    def sources(self) -> Stream: ...
+    @property
+    def all_references(self) -> Stream: ...
+    @property
+    def pairing(self) -> Pairing: ...
+    @property
+    def notes(self) -> list[str]: ...
+
+def is_video(output: str | PathLike[str]) -> bool: ...
+def journal_of(output: str | PathLike[str]) -> Path: ...
+def load_frames(
+    references: Stream,
+    sources: Stream,
+    depth: DepthProvider,
+    chosen: Sequence[int],
+    told: Callable[[int], object],
+) -> tuple[list[int], list[NDArray[Any]], list[NDArray[Any]], list[NDArray[float32]], str]: ...
+def left_out(count: int, first: str) -> str: ...
+def with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str: ...
+
+class Registration:
+    @property
+    def frames(self) -> int: ...
+    @property
+    def earlier(self) -> int: ...
+    @property
+    def made(self) -> int: ...
+    @property
+    def valid(self) -> int: ...
+    @property
+    def pixels(self) -> int: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def busy(self) -> dict[str, float]: ...
+    def line(self) -> str: ...
+    def summary(self) -> str: ...
+
+def register_frames(
+    references: Stream,
+    sources: Stream,
+    depth: DepthProvider,
+    registrar: Registrar,
+    output: str | PathLike[str],
+    overlays: bool,
+    overwrite: bool,
+    part_frames: int,
+    inputs: Sequence[tuple[str, str]],
+    codecs: object,
+    told: Callable[[Registration], object],
+    hold_interrupts: bool,
+) -> Registration: ...
