@@ -2,7 +2,7 @@
 
 Frames are written first, to a folder of PNG files or to videos. Then all of them are registered,
 memory being sampled; and, for the gain, short stretches one after the other, stage after stage on
-one thread and overlapped, in turns. The registrar has all cores in both.
+one thread and overlapped, in turns.
 
     python bench/stream.py [--frames 10000] [--width 640] [--kind folder|video] [--work FOLDER]
 """
@@ -114,8 +114,8 @@ def main() -> None:
         for turn in range(ROUNDS):
             few = part(frames, (turn * STRETCH) % max(1, len(frames) - STRETCH), STRETCH)
             for overlapped in (True, False) if turn % 2 else (False, True):
-                options = RegistrationOptions(overwrite=True)
-                result = run_registration(few, rig, out, options, None, True, overlapped)
+                options = RegistrationOptions(0 if overlapped else 1, overwrite=True)
+                result = run_registration(few, rig, out, options, None, True)
                 rates[overlapped].append(result.frames / result.seconds)
                 last[overlapped] = result
         ratios = np.array(rates[True]) / np.array(rates[False])

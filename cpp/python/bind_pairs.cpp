@@ -76,8 +76,8 @@ times.)");
     py::class_<Pairs>(m, "Pairs", "Two streams, and which of their frames belong together.")
         .def(py::init([](StreamPointer references, StreamPointer sources, std::string method,
                          std::optional<double> time_offset, std::optional<double> max_gap,
-                         const std::optional<Path>& reference_times,
-                         const std::optional<Path>& source_times,
+                         const std::optional<std::filesystem::path>& reference_times,
+                         const std::optional<std::filesystem::path>& source_times,
                          std::optional<OffsetEstimate> estimate) {
                  return Pairs(std::move(references), std::move(sources),
                               {std::move(method), time_offset, max_gap,

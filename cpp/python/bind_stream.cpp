@@ -58,10 +58,24 @@ py::object times_of(const Stream& stream) {
                                stream.times->data());
 }
 
-int checked(const Stream& stream, int index) {
-    const int size = stream.size();
-    if (index < -size || index >= size) throw py::index_error();
-    return index < 0 ? index + size : index;
+// A frame by its index, or the stream of those of a slice.
+py::object item_of(const StreamPointer& stream, const py::object& item) {
+    const int size = stream->size();
+    if (py::isinstance<py::slice>(item)) {
+        py::ssize_t start = 0, stop = 0, step = 0, length = 0;
+        if (!item.cast<py::slice>().compute(size, &start, &stop, &step, &length))
+            throw py::error_already_set();
+        std::vector<int> indices;
+        for (py::ssize_t i = 0; i < length; ++i)
+            indices.push_back(static_cast<int>(start + i * step));
+        return py::cast(
+            std::static_pointer_cast<Stream>(std::make_shared<Picked>(stream, std::move(indices))));
+    }
+    int index = item.cast<int>();
+    if (index < -size || index >= size)
+        throw py::index_error("frame " + std::to_string(index) + " of " + std::to_string(size));
+    if (index < 0) index += size;
+    return array_of(unlocked([&] { return (*stream)[index]; }));
 }
 
 }  // namespace
@@ -77,26 +91,11 @@ where(index) and read(index): frame 0 <= index < len, (H, W) or (H, W, 3), uint8
 file(index) where that is not where(index); and parallel = True if several threads may read.)")
         .def(py::init<>())
         .def("__len__", &Stream::size)
-        .def(
-            "__getitem__",
-            [](Stream& stream, int index) {
-                index = checked(stream, index);
-                const py::gil_scoped_release unlocked;
-                return stream[index];
-            },
-            py::arg("index"))
-        .def(
-            "__getitem__",
-            [](const StreamPointer& stream, const py::slice& slice) -> StreamPointer {
-                py::ssize_t start = 0, stop = 0, step = 0, length = 0;
-                if (!slice.compute(stream->size(), &start, &stop, &step, &length))
-                    throw py::error_already_set();
-                std::vector<int> indices;
-                for (py::ssize_t i = 0; i < length; ++i)
-                    indices.push_back(static_cast<int>(start + i * step));
-                return std::make_shared<Picked>(stream, std::move(indices));
-            },
-            py::arg("indices"))
+        .def("__getitem__", &item_of)
+        .def("__iter__",
+             [](const py::object& stream) {
+                 return py::reinterpret_steal<py::object>(PySeqIter_New(stream.ptr()));
+             })
         .def("name", &Stream::name, py::arg("index"),
              "What a file made from the frame is called, without suffix.")
         .def("where", &Stream::where, py::arg("index"),

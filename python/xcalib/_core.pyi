@@ -6,8 +6,6 @@ from typing import Any, overload
 from numpy import float32, float64, intp, uint8
 from numpy.typing import ArrayLike, NDArray
 
-from .depth import DepthProvider
-
 class InputError(ValueError):
     """Input that cannot be used; the message names the file or argument and what was expected."""
 
@@ -937,7 +935,7 @@ def refine_offset(
     rig: Rig,
     references: Stream,
     sources: Stream,
-    depth: DepthProvider,
+    depth: Any,
     candidates: Sequence[float],
     max_frames: int = 12,
 ) -> RefinedOffset: ...
@@ -954,7 +952,7 @@ class Pairs:
         source_times: str | PathLike[str] | None = None,
         estimate: OffsetEstimate | None = None,
     ) -> None: ...
-    def refine(self, rig: Rig, open_depth: Callable[[list[int]], DepthProvider]) -> None: ...
+    def refine(self, rig: Rig, open_depth: Callable[[list[int]], Any]) -> None: ...
     @property
     def references(self) -> Stream: ...
     @property
@@ -971,7 +969,7 @@ def journal_of(output: str | PathLike[str]) -> Path: ...
 def load_frames(
     references: Stream,
     sources: Stream,
-    depth: DepthProvider,
+    depth: Any,
     chosen: Sequence[int],
     told: Callable[[int], object],
 ) -> tuple[list[int], list[NDArray[Any]], list[NDArray[Any]], list[NDArray[float32]], str]: ...
@@ -999,7 +997,7 @@ class Registration:
 def register_frames(
     references: Stream,
     sources: Stream,
-    depth: DepthProvider,
+    depth: Any,
     registrar: Registrar,
     output: str | PathLike[str],
     overlays: bool,

@@ -143,6 +143,7 @@ TEST_P(RegisteringFrames, AnErrorInAStageKeepsWhatCameBefore) {
         std::filesystem::remove_all(scratch / "");
         *stage = fail;
         EXPECT_EQ(refusal([&] { run(); }), "frame 20");
+        EXPECT_EQ(contents().count("out/000021.png"), 0u);
         *stage = [](int) {};
         EXPECT_EQ(run().earlier, 20);
         expect_whole();

@@ -15,8 +15,8 @@
 namespace xcalib {
 namespace {
 
-// Where stages take frames in order, so many more are under way than there are threads to work on
-// them: they wait for their turn with what the stages before have done.
+// So many more frames are under way than are worked on: they wait for their turn where a stage
+// takes them in order, with what the stages before have done.
 constexpr int kWaiting = 2;
 
 std::string percentages(const BusyShares& busy) {
@@ -162,10 +162,8 @@ Registration register_frames(const Frames& frames, const Rig& rig,
     }
     const std::vector<int> needed = frames_needed(frames, missing);
 
-    const bool all_concurrent = frames.references->concurrent() && frames.sources->concurrent() &&
-                                frames.depth->concurrent() && sink->concurrent();
     int threads = resolve_threads(options.registrar.num_threads);
-    if (threads > 1 && !all_concurrent) threads += kWaiting;
+    if (threads > 1) threads += kWaiting;
     threads = std::min(threads, std::max(1, static_cast<int>(needed.size())));
     RegistrarOptions one_thread = options.registrar;  // frames are what is done in parallel
     if (threads > 1) one_thread.num_threads = 1;
@@ -189,6 +187,8 @@ Registration register_frames(const Frames& frames, const Rig& rig,
               }),
         stage("depth", frames.depth->concurrent(),
               [&](Passing& p, int i) { p.frame.depth = (*frames.depth)(i, p.frame.reference); }),
+        // What cannot be read ends all that would come after it: nothing of that is written.
+        stage("depth", false, [](Passing&, int) {}),
         stage("warp", true,
               [&](Passing& p, int i) {
                   if (missing[i])

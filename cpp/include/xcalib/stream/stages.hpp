@@ -34,8 +34,8 @@ using BusyShares = std::vector<std::pair<std::string, double>>;
 // second; it may throw. An error, there or in a stage, ends all: no other frame is begun, those
 // under way before the one that failed are finished, none after it gets past a stage that takes
 // them in order, no thread is left. Of several errors that of the earliest frame is thrown; that
-// of `told` if no frame failed. On a request to end (interrupts.hpp) no other frame is begun either,
-// and it is for `told` to throw.
+// of `told` if no frame failed. On a request to end (interrupts.hpp) no other frame is begun
+// either, and it is for `told` to throw.
 void run_stages(int count, const std::vector<Stage>& stages, int threads,
                 const std::function<void(int done, const BusyShares& busy)>& told);
 
