@@ -151,15 +151,15 @@ class AdamOptions:
     batch: int
     """Pairs, >= 1."""
     learning_rate: float
-    """Of stage 1, > 0."""
+    """Learning rate of stage 1, > 0."""
     fine_learning_rate: float
-    """Of stage 2, > 0."""
+    """Learning rate of stage 2, > 0."""
     decay: float
-    """Of either by a step, in (0, 1]."""
+    """Factor of either with each step, in (0, 1]."""
     fine_from: float
     """Share of all steps at which stage 2 begins, in [0, 1]."""
     translation_scales: int
-    """Of Eq. (translation), 1 to 3."""
+    """Scales of Eq. (translation), 1 to 3."""
 
     def __init__(self, **kwargs: Any) -> None: ...
 
@@ -169,7 +169,7 @@ class CalibrationOptions:
     max_frames: int
     """Pairs used, spread over the footage; >= 1."""
     seed: int
-    """Of the frame choice."""
+    """Seed of the frame choice."""
     num_threads: int
     """0 uses every core."""
     working_width: int
@@ -225,7 +225,7 @@ class LevelReport:
         """[px]"""
     @property
     def iterations(self) -> int:
-        """Of Levenberg-Marquardt."""
+        """Iterations of Levenberg-Marquardt."""
     @property
     def initial_cost(self) -> float:
         """Eq. (image_loss), and, where they act, the flow term and the prior."""
@@ -243,7 +243,7 @@ class LevelReport:
         """Share of the reference's edge energy that the source covers."""
     @property
     def condition_number(self) -> float:
-        """Of the normal equations, columns scaled to unit norm."""
+        """Condition number of the normal equations, columns scaled to unit norm."""
     @property
     def seconds(self) -> float:
         """[s]"""
@@ -261,7 +261,7 @@ class CandidateReport:
         """Pooled over the frames, of doubled angles, in [-1, 1]."""
     @property
     def overlap(self) -> float:
-        """Of both images' edges."""
+        """Overlap of both images' edges."""
     @property
     def refined_nec(self) -> float:
         """After the coarse levels."""
@@ -276,7 +276,7 @@ class AdamStep:
     """Before a step of Adam is taken: means over its batch."""
     @property
     def learning_rate(self) -> float:
-        """Of the step."""
+        """Learning rate of the step."""
     @property
     def image(self) -> float:
         """Eq. (image_loss)."""
@@ -306,7 +306,7 @@ class CalibrationReport:
         """Where they go [s]: `prepare` (working images and their pyramid), `search`, `warp`
         (reprojection and sampling of the passes over image pairs), `value` (the rest of the
         passes without derivatives), `jacobian` (the rest of those with them), `solver` (Ceres
-        itself). Of what threads do side by side, their sum divided by their number.
+        itself): the sum over threads divided by their number.
         """
     @property
     def working_width(self) -> int:
@@ -322,24 +322,25 @@ class CalibrationReport:
         """Typical of rigs displaced by many pixels."""
     @property
     def contrast(self) -> float:
-        """Of the NEC above the baseline, in deviations over displacements."""
+        """NEC above the baseline, in deviations over displacements."""
     @property
     def repeatability_px(self) -> float:
         """Median distance between fits to two halves of the frames [working px]."""
     @property
     def visible_shift_px(self) -> float:
-        """Of the shift, linear over the image, that flow between the registered images
-        still sees: the length that 90 % of the pixels do not exceed [working px];
-        NaN where it cannot tell."""
+        """Shift, linear over the image, that flow between the registered images still sees:
+        the length that 90 % of the pixels do not exceed [working px]; NaN where it is not
+        known.
+        """
     @property
     def valid_share(self) -> float:
-        """Of the reference's edge energy."""
+        """Share of the reference's edge energy."""
     @property
     def frames(self) -> list[int]:
         """Indices of the pairs used."""
     @property
     def candidates(self) -> list[CandidateReport]:
-        """Of the search, best score first."""
+        """Candidates of the search, best score first."""
     @property
     def levels(self) -> list[LevelReport]:
         """In the order solved."""
@@ -492,19 +493,19 @@ def psnr(
 def patch_shifts(
     reference: NDArray[Any], registered: NDArray[Any], mask: NDArray[Any] | None = None
 ) -> NDArray[float32]:
-    """(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches that tell; see
-    metrics.patch_residual().
+    """(N, 4) float32: centre x, y and residual shift dx, dy [px] of the patches with a clear
+    peak; see metrics.patch_residual().
     """
 
 class FlowOptions:
     """Options of patch_flow()."""
 
     step: int
-    """Of the grid of patches [px], odd, >= 3."""
+    """Distance of patches on their grid [px], odd, >= 3."""
     patch: int
     """Side of a patch [px], an odd multiple of the step."""
     levels: int
-    """Of the pyramid, >= 1."""
+    """Levels of the pyramid, >= 1."""
     max_shift: int
     """Farthest shift that the coarsest level looks for [px], >= 1."""
     def __init__(self, **kwargs: Any) -> None: ...
@@ -559,7 +560,7 @@ class OffsetEstimate:
     ) -> None: ...
     @property
     def offset(self) -> float:
-        """By how much the source's clock is late [s]; 0 where the footage does not tell."""
+        """By how much the source's clock is late [s]; 0 where the footage does not show it."""
     @property
     def trusted(self) -> bool:
         """Whether it does."""
@@ -579,8 +580,8 @@ class RefinedOffset:
     """A clock offset chosen by how well frames register, and what speaks for it."""
     @property
     def offset(self) -> float:
-        """By how much the source's clock is late [s]; the middle candidate where nothing is
-        told.
+        """By how much the source's clock is late [s]; the middle candidate where it is not
+        known.
         """
     @property
     def told(self) -> bool:
@@ -592,7 +593,9 @@ class RefinedOffset:
         """In one line."""
 
 def fingerprint(data: str | bytes) -> str:
-    """16 hexadecimal digits of a text, or of bytes: it tells changes by accident, not by intent."""
+    """16 hexadecimal digits of a text, or of bytes: it detects accidental changes, not intended
+    ones.
+    """
 
 def absolute_path(path: str | PathLike[str]) -> Path:
     """A path from the root, without `.` and empty parts; `..` and links stay."""
@@ -644,7 +647,7 @@ class Candidate:
         """A frame that cannot be decoded."""
     @property
     def index(self) -> int:
-        """Of the frame in the footage."""
+        """Index of the frame in the footage."""
     @property
     def decoded(self) -> bool:
         """Whether there were images to look at."""
@@ -677,7 +680,7 @@ class Choice:
     """The frames to calibrate on, and what was found out on the way."""
     @property
     def indices(self) -> list[int]:
-        """Of the frames taken, rising."""
+        """Indices of the frames taken, rising."""
     @property
     def candidates(self) -> list[Candidate]:
         """Every frame looked at, in order."""
@@ -688,7 +691,7 @@ class Choice:
         """One line per candidate: its name, what was measured, why it was taken or left."""
 
 def choose(candidates: Sequence[Candidate], max_frames: int) -> Choice:
-    """The Choice of at most max_frames of the candidates that say most about the rig; without a
+    """The Choice of at most max_frames of the candidates that determine the rig best; without a
     usable one it is empty.
     """
 
@@ -696,7 +699,7 @@ class ColorMap:
     """A curve in the colour cube, from cold to hot."""
     @property
     def name(self) -> str:
-        """Of a known map, or `estimated`."""
+        """Name of a known map, or `estimated`."""
     @property
     def curve(self) -> NDArray[uint8]:
         """(256, 3) uint8, blue, green, red."""
@@ -733,7 +736,7 @@ class PlaneDepth:
         """Raises InputError: field, value, range."""
     @property
     def camera_height(self) -> float:
-        """Of the reference camera above the road [m], > 0."""
+        """Height of the reference camera above the road [m], > 0."""
     @property
     def horizon(self) -> float:
         """Its row in the middle column, as a fraction of the image height from the top, (-1, 1)."""
@@ -742,7 +745,7 @@ class PlaneDepth:
         """Largest depth [m], > 0."""
     @property
     def hfov_deg(self) -> float:
-        """Of the reference camera [deg], (0, 180); pixels are square."""
+        """Horizontal field of view of the reference camera [deg], (0, 180); pixels are square."""
     @property
     def roll_deg(self) -> float:
         """How far the horizon falls towards the right [deg], (-45, 45)."""
@@ -860,7 +863,9 @@ def _flow_arguments() -> dict[str, str]:
     """CalibrationOptions.flow by what --flow of the command takes."""
 
 def report_document(report: CalibrationReport, rig_file: str, files: Sequence[str]) -> str:
-    """JSON text of a report, as `xcalib calibrate --report` writes it; files: those of its frames."""
+    """JSON text of a report, as `xcalib calibrate --report` writes it; files: those of its
+    frames.
+    """
 
 def evaluation_document(evaluation: Evaluation, rig_file: str, files: Sequence[str]) -> str:
     """JSON text of an Evaluation, as `xcalib evaluate --json` writes it; files: those of its
@@ -893,6 +898,14 @@ def overlay(
     """
 
 class Stream:
+    """A sized sequence of frames, each read at the moment of access, all of one size.
+
+    Only names and times are held, so that memory does not grow with the pixels of the
+    footage. A slice is a stream again. A class of streams calls super().__init__() and has
+    __len__, name(index), where(index) and read(index): frame 0 <= index < len, (H, W) or (H,
+    W, 3), uint8, uint16 or float32; file(index) where that is not where(index); and parallel
+    = True if several threads may read.
+    """
     def __init__(self) -> None: ...
     def __len__(self) -> int: ...
     @overload
@@ -900,37 +913,79 @@ class Stream:
     @overload
     def __getitem__(self, indices: slice) -> Stream: ...
     def __iter__(self) -> Iterator[NDArray[Any]]: ...
-    def name(self, index: int) -> str: ...
-    def where(self, index: int) -> str: ...
-    def file(self, index: int) -> Path: ...
+    def name(self, index: int) -> str:
+        """What a file made from the frame is called, without suffix."""
+    def where(self, index: int) -> str:
+        """Where the frame is, for messages: a file, or a file and the frame's number."""
+    def file(self, index: int) -> Path:
+        """The file that the frame is in, or the folder of a bag."""
     @property
-    def parallel(self) -> bool: ...
-    @property
-    def times(self) -> NDArray[float64] | None: ...
-    @times.setter
-    def times(self, times: Sequence[float] | NDArray[float64] | None) -> None: ...
+    def parallel(self) -> bool:
+        """Whether several threads may read at a time."""
+    times: NDArray[float64] | None
+    """(N,) seconds of the frames, never falling; None where unknown. Each stream has its
+        clock.
+        """
 
 class Picked(Stream):
+    """Some frames of a stream, in order."""
     def __init__(self, stream: Stream, indices: Sequence[int]) -> None: ...
 
 class Half(Stream):
-    def __init__(self, stream: Stream, half: str) -> None: ...
+    """A half of every frame: two cameras side by side, or one above the other, in one stream."""
+    def __init__(self, stream: Stream, half: str) -> None:
+        """half: left, right, top or bottom."""
 
-def read_times(table: str | PathLike[str], stream: Stream) -> list[float]: ...
-def scalar_sources(images: Stream, colormap: str = "auto") -> tuple[Stream, str]: ...
+def read_times(table: str | PathLike[str], stream: Stream) -> list[float]:
+    """Seconds of the frames of a stream from a file of `name timestamp` lines, see
+    times_of_table().
+    """
+
+def scalar_sources(images: Stream, colormap: str = "auto") -> tuple[Stream, str]:
+    """Source images with false colour turned back to numbers, and a line that says so, or ''.
+
+    colormap: auto (a few frames, spread over the footage, are read to decide), none (images
+    as they are), or the name of a known map.
+    """
+
 def pair_streams(
     references: Stream,
     sources: Stream,
     method: str = "auto",
     offset: float = 0.0,
     max_gap: float | None = None,
-) -> Pairing: ...
-def match_depths(references: Stream, used: Sequence[int], depths: Stream) -> list[int]: ...
-def nearest_depths(references: Stream, used: Sequence[int], depths: Stream) -> list[int]: ...
+) -> Pairing:
+    """Pairs two streams.
+
+    method: name (pair_files), order (first with first, of equally many), time (pair_times),
+    or auto: by time where both have times, else files by name, and others in order. offset
+    [s]: reference time t is source time t + offset; not 0: by time. Raises InputError.
+    """
+
+def match_depths(references: Stream, used: Sequence[int], depths: Stream) -> list[int]:
+    """The depth file, as an index into depths, of each of the references used.
+
+    Files under the names of the frames are theirs, and others are left over. Else the nearest
+    in time within half a period of the references, where both tell it; else by pair_files, of
+    all references or of those in use. Raises InputError.
+    """
+
+def nearest_depths(references: Stream, used: Sequence[int], depths: Stream) -> list[int]:
+    """The nearest depth map in time, as match_depths() does it, of streams with times."""
+
 def estimate_offset(
     references: Stream, sources: Stream, max_offset: float = 2.0, max_frames: int = 1500
-) -> OffsetEstimate: ...
-def offsets_around(guess: float, references: Stream, sources: Stream) -> list[float]: ...
+) -> OffsetEstimate:
+    """A constant offset between the clocks of two streams with times, neither registered.
+
+    max_offset: the largest looked for, either way [s]; also at most a third of the footage.
+    max_frames: references read at most, from the middle of the footage. Raises InputError
+    where the times do not overlap.
+    """
+
+def offsets_around(guess: float, references: Stream, sources: Stream) -> list[float]:
+    """Candidates for refine_offset(): 6 frames of the faster stream either way, in quarters [s]."""
+
 def refine_offset(
     rig: Rig,
     references: Stream,
@@ -938,9 +993,19 @@ def refine_offset(
     depth: Any,
     candidates: Sequence[float],
     max_frames: int = 12,
-) -> RefinedOffset: ...
+) -> RefinedOffset:
+    """Chooses among candidate offsets by how well the frames register with a rig.
+
+    candidates [s], rising, around a guess in their middle. Of those that differ from the best
+    by less than the frames do among each other (two standard errors of the mean), the one
+    nearest to the middle is taken: the guess, unless the frames speak against it. Candidates
+    that pair the same frames score the same. max_frames: frames of the slower stream judged,
+    spread over the footage, the same ones for every candidate; those that cannot be decoded
+    are left out. Raises InputError without candidates or times.
+    """
 
 class Pairs:
+    """Two streams, and which of their frames belong together."""
     def __init__(
         self,
         references: Stream,
@@ -951,48 +1016,85 @@ class Pairs:
         reference_times: str | PathLike[str] | None = None,
         source_times: str | PathLike[str] | None = None,
         estimate: OffsetEstimate | None = None,
-    ) -> None: ...
-    def refine(self, rig: Rig, open_depth: Callable[[list[int]], Any]) -> None: ...
+    ) -> None:
+        """As pair_streams(); time_offset None: estimated. The tables are read by read_times().
+        Nothing else is read, save that an offset to be estimated, unless there is an
+        estimate, needs the frames.
+        """
+    def refine(self, rig: Rig, open_depth: Callable[[list[int]], Any]) -> None:
+        """Pairs anew with the offset at which frames register best with the rig.
+        open_depth(used): the provider of the depth of these of all references. Without an
+        estimated offset the pairs stay as they are, and so they do where the registered
+        frames tell neither around the estimate nor around 0.
+        """
     @property
-    def references(self) -> Stream: ...
+    def references(self) -> Stream:
+        """Those that have a partner."""
     @property
-    def sources(self) -> Stream: ...
+    def sources(self) -> Stream:
+        """Their partners, in the same order."""
     @property
-    def all_references(self) -> Stream: ...
+    def all_references(self) -> Stream:
+        """With those that do not."""
     @property
-    def pairing(self) -> Pairing: ...
+    def pairing(self) -> Pairing:
+        """Indices into the streams."""
     @property
-    def notes(self) -> list[str]: ...
+    def notes(self) -> list[str]:
+        """What the user should know, a line each."""
 
-def is_video(output: str | PathLike[str]) -> bool: ...
-def journal_of(output: str | PathLike[str]) -> Path: ...
+def is_video(output: str | PathLike[str]) -> bool:
+    """Whether an output of this name is a video."""
+
+def journal_of(output: str | PathLike[str]) -> Path:
+    """Where the journal of an output is: in the folder, or beside the video, named after it."""
+
 def load_frames(
     references: Stream,
     sources: Stream,
     depth: Any,
     chosen: Sequence[int],
     told: Callable[[int], object],
-) -> tuple[list[int], list[NDArray[Any]], list[NDArray[Any]], list[NDArray[float32]], str]: ...
-def left_out(count: int, first: str) -> str: ...
-def with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str: ...
+) -> tuple[list[int], list[NDArray[Any]], list[NDArray[Any]], list[NDArray[float32]], str]:
+    """(indices, references, sources, depths, line) of the chosen frames, in memory.
+
+    Those that cannot be decoded are left out, and line says how many, or is ''; if none is
+    left, raises DecodeError of the first. told(done) is called after each.
+    """
+
+def left_out(count: int, first: str) -> str:
+    """The warning that frames were left out of a calibration, and why the first was."""
+
+def with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str:
+    """The message with the file that the core, which sees arrays only, calls `frame N`."""
 
 class Registration:
+    """How far a stream is registered, and its totals."""
     @property
-    def frames(self) -> int: ...
+    def frames(self) -> int:
+        """Of the stream."""
     @property
-    def earlier(self) -> int: ...
+    def earlier(self) -> int:
+        """That were there from an earlier run."""
     @property
-    def made(self) -> int: ...
+    def made(self) -> int:
+        """That this run has made."""
     @property
-    def valid(self) -> int: ...
+    def valid(self) -> int:
+        """Valid pixels of the frames of either."""
     @property
-    def pixels(self) -> int: ...
+    def pixels(self) -> int:
+        """Of all frames."""
     @property
-    def seconds(self) -> float: ...
+    def seconds(self) -> float:
+        """That this run took so far."""
     @property
-    def busy(self) -> dict[str, float]: ...
-    def line(self) -> str: ...
-    def summary(self) -> str: ...
+    def busy(self) -> dict[str, float]:
+        """Share of that time, [0, 1], that each stage was at work, by name."""
+    def line(self) -> str:
+        """While it is under way, in one line."""
+    def summary(self) -> str:
+        """At its end, in one line."""
 
 def register_frames(
     references: Stream,
@@ -1007,4 +1109,14 @@ def register_frames(
     codecs: object,
     told: Callable[[Registration], object],
     hold_interrupts: bool,
-) -> Registration: ...
+) -> Registration:
+    """Registers all frames that an earlier run has not written, and returns the Registration.
+
+    registrar: with a rig and options to register by; its threads are those of the whole run.
+    part_frames: of a video, that a run that is killed can lose at most. inputs: (name, text)
+    of all that the frames were opened with; an output of others is refused. codecs: has
+    write_image(file, image), encoder_name(), Encoder(part, target, first, rate) and
+    join(parts, target, rate, check). told(registration) is called in this thread after
+    frames, and a few times a second. hold_interrupts: in the main thread, SIGINT and SIGTERM
+    end the run between two frames, by KeyboardInterrupt.
+    """

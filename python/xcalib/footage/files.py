@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from .._core import natural_order, read_times, times_of_names
 from ..frames import (
@@ -35,10 +36,11 @@ class ImageFiles(Stream):
     def __init__(self, paths: Sequence[Path]) -> None:
         super().__init__()
         self.paths = list(paths)
-        self.times = times_of_names([path.stem for path in self.paths])
+        times = times_of_names([path.stem for path in self.paths])
+        self.times = None if times is None else np.array(times)
         for table in TIME_TABLES:
             if self.paths and (self.paths[0].parent / table).is_file():
-                self.times = read_times(self.paths[0].parent / table, self)
+                self.times = np.array(read_times(self.paths[0].parent / table, self))
 
     def __len__(self) -> int:
         return len(self.paths)
