@@ -25,7 +25,7 @@ function(xcalib_pkgconfig name description)
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 endfunction()
 
-foreach(name IN ITEMS register rig_file core)
+foreach(name IN ITEMS register rig_file core stream)
   if(TARGET xcalib_${name})
     install(EXPORT xcalib_${name} NAMESPACE xcalib:: DESTINATION ${to} COMPONENT development
       FILE xcalib_${name}.cmake)
@@ -43,4 +43,5 @@ endif()
 if(TARGET xcalib_core AND BUILD_SHARED_LIBS)
   # Of what a static Ceres needs in turn, only CMake is told.
   xcalib_pkgconfig(core "Calibrates thermal-visible camera rigs" REQUIRES xcalib_rig_file eigen3)
+  xcalib_pkgconfig(stream "Registers streams of thermal-visible frames" REQUIRES xcalib_core)
 endif()

@@ -26,7 +26,7 @@ endfunction()
 
 set(CPACK_COMPONENTS_ALL)
 set(libraries)
-foreach(library IN ITEMS register rig_file core)
+foreach(library IN ITEMS register rig_file core stream)
   if(TARGET xcalib_${library})
     string(REPLACE _ - name libxcalib-${library})
     xcalib_package(${library} ${name} libs DEPENDS ${libraries})

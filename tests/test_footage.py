@@ -16,15 +16,15 @@ from conftest import FRAMES, run
 from xcalib import Pinhole, Rig, metrics
 from xcalib.depth import FolderDepth, PlaneDepth, read_depth
 from xcalib.footage import (
-    Matching,
     OffsetEstimate,
-    Pairing,
     Pairs,
     Stream,
     camera_infos,
+    encoder,
     estimate_offset,
     match_depths,
     offsets_around,
+    open_matched_depth,
     open_pairs,
     open_stream,
     pair_streams,
@@ -32,9 +32,7 @@ from xcalib.footage import (
     read_times,
     refine_offset,
 )
-from xcalib.footage.writer import VideoSink, journal_of
 from xcalib.frames import DecodeError, Image, InputError, list_files, read_image, write_image
-from xcalib.journal import Journal
 
 Refused = Callable[..., str]
 
@@ -220,56 +218,38 @@ def test_halves(tmp_path: Path) -> None:
         open_stream(f"{tmp_path / 'odd'}#right")[0]
 
 
-@pytest.mark.parametrize(
-    ("name", "image", "problem"),
-    [
-        ("a.mp4", np.zeros((4, 4), np.uint16), "uint16 gray; .mp4 holds uint8, a folder holds any"),
-        ("a.mkv", np.zeros((4, 4), np.float32), "float32 gray; .mkv holds uint8 and gray uint16"),
-        ("a.mkv", np.zeros((4, 4, 3), np.uint16), "uint16 colour"),
-        ("a.avi", np.zeros((4, 5), np.uint8), "5x4; a video holds even sizes"),
-    ],
-)
-def test_what_a_video_cannot_hold(tmp_path: Path, name: str, image: Image, problem: str) -> None:
-    with pytest.raises(InputError, match=problem):
-        write_sink(tmp_path / name, [image])
-    assert not list(tmp_path.iterdir())
-
-
-def write_sink(path: Path, frames: list[Image], overlay: Image | None = None) -> None:
-    with (
-        Journal(journal_of(path), {}) as journal,
-        VideoSink(path, 10, journal) as sink,
-    ):
-        sink.begin([str(index) for index in range(len(frames))])
-        for index, frame in enumerate(frames):
-            mask = np.full(frame.shape[:2], index, np.uint8)
-            sink.write(index, "", frame, mask, overlay)
-        sink.finish(lambda: None)
-
-
-def test_a_video_holds_frames_of_one_kind(tmp_path: Path) -> None:
-    frames = [moving(1)[0], moving(1, channels=3)[0]]
-    with pytest.raises(InputError, match=r"a frame is \(120, 160, 3, 'uint8'\), the first is"):
-        write_sink(tmp_path / "a.mkv", frames)
+def write_parts(path: Path, frames: list[Image]) -> None:
+    """A video joined of a part for each of the frames."""
+    parts = []
+    for index, frame in enumerate(frames):
+        parts.append((path.with_name(f"{index}"), 1))
+        part = encoder.Encoder(parts[-1][0], path, frame, 10)
+        part.write(frame)
+        part.close(1)
+    encoder.join(parts, path, 10, lambda: None)
 
 
 def test_a_video_is_whole_or_absent(tmp_path: Path) -> None:
     frames = moving(3, np.uint16)
-    write_sink(tmp_path / "a.mkv", frames)
-    names = ["a.masks.mkv", "a.mkv", "a.mkv.register.jsonl"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == names
-    np.testing.assert_array_equal(open_stream(tmp_path / "a.mkv")[2], frames[2])
-    np.testing.assert_array_equal(open_stream(tmp_path / "a.masks.mkv")[1], np.ones((120, 160)))
-    with pytest.raises(InputError):
-        write_sink(tmp_path / "b.mkv", frames, overlay=np.zeros((2, 2), np.float32))
-    assert sorted(path.name for path in tmp_path.iterdir()) == names
+    write_parts(tmp_path / "a.mkv", frames)
+    assert {path.name for path in tmp_path.iterdir()} == {"0", "1", "2", "a.mkv"}
+    for found, frame in zip(open_stream(tmp_path / "a.mkv"), frames, strict=True):
+        np.testing.assert_array_equal(found, frame)
+    part = encoder.Encoder(tmp_path / "b", tmp_path / "b.mkv", frames[0], 10)
+    part.write(frames[0])
+    with pytest.raises(OSError, match=r"b\.mkv: 1 of 2 frames could be written"):
+        part.close(2)
+    part.discard()
+    with pytest.raises(OSError, match="coded otherwise"):
+        write_parts(tmp_path / "c.mkv", [frames[0], moving(1)[0]])
+    assert {path.name for path in tmp_path.iterdir()} == {"0", "1", "2", "a.mkv"}
 
 
 def test_a_video_may_have_any_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """FFmpeg would take ``a:`` for a protocol."""
     monkeypatch.chdir(tmp_path)
     frames = moving(2)
-    write_sink(Path("a:b.c.mkv"), frames)
+    write_parts(Path("a:b.c.mkv"), frames)
     np.testing.assert_array_equal(open_stream(tmp_path / "a:b.c.mkv")[1], frames[1])
 
 
@@ -439,17 +419,16 @@ def test_depth_topics_are_matched_by_time_or_in_order(tmp_path: Path) -> None:
         (None, [0, 2, 3], [1, 3, 4]),
     ):
         references = Listed([image] * (6 if times is None else 2), times)
-        pairing = Pairing("order", np.array(used), np.array(used))
-        depth = Pairs(references, references, pairing, ()).open_depth(f"{bag}#/depth")
+        depth = open_matched_depth(references, used, f"{bag}#/depth")
         assert [depth(i, image).mean() for i in range(len(used))] == expected
-    pairs = Pairs(*[Listed([image] * 4)] * 2, Pairing("order", np.arange(3), np.arange(3)), ())
+    four = Listed([image] * 4)
     with pytest.raises(InputError, match="first of 6 depth maps, memory frame 0 of 4 reference"):
-        pairs.open_depth(f"{bag}#/depth")
+        open_matched_depth(four, [0, 1, 2], f"{bag}#/depth")
     with pytest.raises(InputError, match="depth is 40x30, but the reference image is 80x80"):
         depth(0, np.zeros((80, 80), np.uint8))
     grey = write_bag(tmp_path / "c", "sqlite", {"/grey": ("mono8", [image] * 4)})
     with pytest.raises(InputError, match="depth is 60x80 uint8, expected 32FC1 in metres or 16UC1"):
-        Pairs(*[Listed([image] * 4)] * 2, pairing, ()).open_depth(grey)(0, image)
+        open_matched_depth(four, [0, 2, 3], grey)(0, image)
 
 
 def test_bags_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -582,6 +561,7 @@ class Listed(Stream):
     """Images in memory."""
 
     def __init__(self, images: list[Image], times: Any = None) -> None:
+        super().__init__()
         self.images, self.times = images, times
 
     def __len__(self) -> int:
@@ -611,7 +591,7 @@ def test_methods_need_what_they_need() -> None:
 
 
 def test_depth_of_the_frames_in_use(tmp_path: Path) -> None:
-    used = np.array([1, 3])
+    used = [1, 3]
     stream = Listed(moving(4), 50.0 + 0.1 * np.arange(4))
 
     def found(*names: str) -> list[int]:
@@ -654,6 +634,7 @@ class Pan(Stream):
     def __init__(
         self, picture: Image, scene_times: Any, late: float, moves: bool, noise: float, seed: int
     ) -> None:
+        super().__init__()
         self.picture, self.scene_times, self.noise = picture, scene_times, noise
         self.times = scene_times + late
         self.seed, self.moves = seed, moves
@@ -841,36 +822,26 @@ def test_register_estimates_how_late_the_source_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("late", "rate"), [(1 / 3, 30), (0.15, 9)])
-def test_a_rig_corrects_the_estimated_offset(
-    monkeypatch: pytest.MonkeyPatch, late: float, rate: float
-) -> None:
+def test_a_rig_corrects_the_estimated_offset(late: float, rate: float) -> None:
     """Two frames off, trusted or not: registration leads back; without motion it says so."""
     visible, thermal = pans(late, rate)
-    monkeypatch.setattr("xcalib.footage.opening.open_stream", {"v": visible, "t": thermal}.get)
     for trusted in (True, False):
         peak = late + 2 / 30
         wrong = OffsetEstimate(peak * trusted, trusted, 0.5 * trusted, 0.2, peak)
-        monkeypatch.setattr("xcalib.footage.opening.estimate_offset", lambda *_, w=wrong: w)
-        pairs = open_pairs("v", "t", Matching(time_offset=None))
+        pairs = Pairs(visible, thermal, time_offset=None, estimate=wrong)
         assert pairs.pairing.offset == wrong.offset
-        refined = pairs.refined(IDENTITY, lambda _: PlaneDepth())
-        assert refined.pairing.offset == pytest.approx(late, abs=0.03)
-        assert len(refined.notes) == 2 + trusted
-        assert "frames register best with the source late by" in refined.notes[-2]
-        assert f"{refined.pairing.offset:+.4f} s" in refined.notes[-1]
+        pairs.refine(IDENTITY, lambda _: PlaneDepth())
+        assert pairs.pairing.offset == pytest.approx(late, abs=0.03)
+        assert len(pairs.notes) == 2 + trusted
+        assert "frames register best with the source late by" in pairs.notes[-2]
+        assert f"{pairs.pairing.offset:+.4f} s" in pairs.notes[-1]
 
 
-def test_a_rig_finds_clocks_that_agree_behind_a_wrong_estimate(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    visible, thermal = pans(0.02)
-    monkeypatch.setattr("xcalib.footage.opening.open_stream", {"v": visible, "t": thermal}.get)
+def test_a_rig_finds_clocks_that_agree_behind_a_wrong_estimate() -> None:
     wrong = OffsetEstimate(1.1, True, 0.5, 0.2, 1.1)
-    monkeypatch.setattr("xcalib.footage.opening.estimate_offset", lambda *_: wrong)
-    refined = open_pairs("v", "t", Matching(time_offset=None)).refined(
-        IDENTITY, lambda _: PlaneDepth()
-    )
-    assert refined.pairing.offset == pytest.approx(0.02, abs=0.03)
+    pairs = Pairs(*pans(0.02), time_offset=None, estimate=wrong)
+    pairs.refine(IDENTITY, lambda _: PlaneDepth())
+    assert pairs.pairing.offset == pytest.approx(0.02, abs=0.03)
 
 
 def test_a_rig_that_stands_still_tells_no_offset_by_registration() -> None:

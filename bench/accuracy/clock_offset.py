@@ -13,6 +13,7 @@ from common import machine
 from figures import figure
 
 from xcalib import synthetic
+from xcalib.depth import DepthProvider
 from xcalib.footage import Stream, estimate_offset, offsets_around, refine_offset
 
 RATE, SECONDS, WIDTH = 30, 3.0, 192
@@ -23,6 +24,7 @@ class Camera(Stream):
     """Images in memory."""
 
     def __init__(self, images, times):
+        super().__init__()
         self.images, self.times = images, times
 
     def __len__(self):
@@ -38,7 +40,7 @@ class Camera(Stream):
         return f"drive frame {index}"
 
 
-class Maps:
+class Maps(DepthProvider):
     """Depth maps in memory."""
 
     def __init__(self, maps):

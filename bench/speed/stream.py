@@ -1,8 +1,8 @@
 """`register` on many frames: frames a second, memory, where the time goes, what overlapping gains.
 
 Frames are written first, to a folder of PNG files or to videos. For the gain, short stretches are
-registered in turns, with the stages one after the other on one thread and with them overlapped; the
-registrar has all cores in both. Then all frames are registered while memory is sampled.
+registered in turns, stage after stage on one thread and overlapped. Then all frames are registered
+while memory is sampled.
 """
 
 import argparse
@@ -112,8 +112,8 @@ def main() -> None:
         for turn in range(ROUNDS):
             few = stretch(frames, (turn * STRETCH) % max(1, len(frames) - STRETCH), STRETCH)
             for overlapped in (True, False) if turn % 2 else (False, True):
-                options = RegistrationOptions(overwrite=True)
-                result = run_registration(few, rig, out, options, None, True, overlapped)
+                options = RegistrationOptions(0 if overlapped else 1, overwrite=True)
+                result = run_registration(few, rig, out, options, None, True)
                 rates[overlapped].append(result.frames / result.seconds)
                 last[overlapped] = result
         for overlapped, label in ((False, "one after the other"), (True, "overlapped")):

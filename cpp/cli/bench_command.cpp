@@ -6,6 +6,7 @@
 #include "xcalib/error.hpp"
 #include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
+#include "xcalib/stream/interrupts.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -40,7 +41,7 @@ void run(const Arguments& a, Console& console) {
         a.rig.empty() ? benchmark_rig(width, height, source_width, source_height) : load_rig(a.rig);
     console.line(frame_benchmark_heading());
     for (const FrameBenchmark& benchmark : frame_benchmarks(rig, a.frames)) {
-        if (interrupted) throw Interrupted();
+        check_interrupts();
         const FrameBenchmarkResult r = run_frame_benchmark(benchmark);
         console.line(to_text(r));
         console.result({{"reference_size", {rig.reference.width, rig.reference.height}},

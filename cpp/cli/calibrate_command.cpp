@@ -4,8 +4,9 @@
 #include <regex>
 
 #include "commands.hpp"
+#include "depth.hpp"
 #include "files.hpp"
-#include "frames.hpp"
+#include "open_frames.hpp"
 #include "xcalib/calibrate.hpp"
 #include "xcalib/depth/fit_plane.hpp"
 #include "xcalib/draw_frames.hpp"
@@ -13,6 +14,7 @@
 #include "xcalib/judge/documents.hpp"
 #include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
+#include "xcalib/stream/files.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -48,11 +50,6 @@ Pinhole intrinsics(const std::string& flag, const std::string& text) {
     return {1, 1, numbers[0], numbers[1], numbers[2], numbers[3]};
 }
 
-std::string left_out(std::size_t count, const std::string& first) {
-    return std::to_string(count) + " unusable " + (count == 1 ? "frame is" : "frames are") +
-           " left out; " + first;
-}
-
 // The frames that say most about the rig.
 std::vector<int> choose_by_content(const Frames& frames, const Arguments& arguments,
                                    Console& console) {
@@ -63,12 +60,11 @@ std::vector<int> choose_by_content(const Frames& frames, const Arguments& argume
     std::vector<Candidate> candidates;
     for (const int index : drawn) {
         try {
-            const cv::Mat reference = (*frames.references)[index];
-            const cv::Mat source = (*frames.sources)[index];
-            const cv::Mat depth = with_depth ? (*frames.depth)(index, reference) : cv::Mat();
-            const ImageView depth_view = view_of(depth);
-            candidates.push_back(look_at(index, view_of(reference), view_of(source),
-                                         with_depth ? &depth_view : nullptr));
+            const Picture reference = (*frames.references)[index];
+            const Picture source = (*frames.sources)[index];
+            const Picture depth = with_depth ? (*frames.depth)(index, reference) : Picture{};
+            candidates.push_back(
+                look_at(index, reference.view, source.view, with_depth ? &depth.view : nullptr));
         } catch (const DecodeError& error) {
             Candidate candidate;
             candidate.index = index;
@@ -102,65 +98,28 @@ std::vector<int> choose_by_content(const Frames& frames, const Arguments& argume
     return choice.indices;
 }
 
-// Frames in memory, and as the core takes them.
-struct Loaded {
-    std::vector<int> indices;
-    std::vector<Frame> frames;
-
-    std::vector<ImageView> views(cv::Mat Frame::*kind) const {
-        std::vector<ImageView> list;
-        for (const Frame& frame : frames) list.push_back(view_of(frame.*kind));
-        return list;
-    }
-};
-
-Loaded load(const Frames& frames, const std::vector<int>& chosen, Console& console) {
-    Loaded loaded;
-    std::vector<DecodeError> failures;
-    for (std::size_t i = 0; i < chosen.size(); ++i) {
-        try {
-            loaded.frames.push_back(frames.read(chosen[i]));
-            loaded.indices.push_back(chosen[i]);
-        } catch (const DecodeError& error) {
-            failures.push_back(error);
-        }
-        console.progress("loading",
-                         static_cast<double>(i + 1) / static_cast<double>(chosen.size()));
-    }
-    if (loaded.frames.empty()) {
-        if (failures.empty()) throw InputError("no frame to calibrate on");
-        throw failures[0];
-    }
-    if (!failures.empty()) console.warn(left_out(failures.size(), failures[0].what()));
+LoadedFrames load(const Frames& frames, const std::vector<int>& chosen, Console& console) {
+    LoadedFrames loaded = load_frames(frames, chosen, [&](int done) {
+        console.progress("loading", static_cast<double>(done) / static_cast<double>(chosen.size()));
+    });
+    if (loaded.failures) console.warn(left_out(loaded.failures, loaded.first_failure));
     return loaded;
 }
 
-// The message with the file that the core, which sees pixels only, calls `frame N`.
-std::string with_file_name(const std::string& message, const Frames& frames,
-                           const std::vector<int>& chosen) {
-    static const std::regex frame(R"(\bframe (\d{1,9})\b)");
-    std::smatch found;
-    if (!std::regex_search(message, found, frame)) return message;
-    const std::size_t index = std::stoul(found[1]);
-    if (index >= chosen.size()) return message;
-    return message + " (frame " + found[1].str() + " is " +
-           frames.references->where(chosen[index]) + ")";
-}
-
-CalibrationResult calibrated(const Frames& frames, const Loaded& loaded,
+CalibrationResult calibrated(const Frames& frames, const LoadedFrames& loaded,
                              const CalibrationOptions& options, std::optional<Rig> initial,
                              Console& console) {
-    const Frame& first = loaded.frames[0];
+    const ImageView &reference = loaded.frames[0].reference.view,
+                    &source = loaded.frames[0].source.view;
     if (initial)
-        initial = fitted(*initial, first.reference.cols, first.reference.rows, first.source.cols,
-                         first.source.rows);
+        initial = fitted(*initial, reference.width, reference.height, source.width, source.height);
     try {
         return calibrate(
             loaded.views(&Frame::reference), loaded.views(&Frame::source),
             loaded.views(&Frame::depth), initial, options,
             [&](const std::string& stage, double share) { console.progress(stage, share); });
     } catch (const std::invalid_argument& error) {
-        throw InputError(with_file_name(error.what(), frames, loaded.indices));
+        throw InputError(with_file_name(error.what(), *frames.references, loaded.indices));
     }
 }
 
@@ -209,10 +168,10 @@ void run(Arguments a, Console& console) {
     const std::vector<int> chosen =
         a.choose == "informed" ? choose_by_content(frames, a, console)
                                : draw_frames(frames.size(), options.max_frames, options.seed);
-    Loaded loaded = load(frames, chosen, console);
-    const auto sized = [](Pinhole camera, const cv::Mat& image) {
-        camera.width = image.cols;
-        camera.height = image.rows;
+    LoadedFrames loaded = load(frames, chosen, console);
+    const auto sized = [](Pinhole camera, const Picture& image) {
+        camera.width = image.view.width;
+        camera.height = image.view.height;
         return camera;
     };
     if (reference_camera)
@@ -224,8 +183,8 @@ void run(Arguments a, Console& console) {
         std::vector<ImageView> references, sources;
         for (const int i : frames_to_judge_plane(static_cast<int>(loaded.frames.size()))) {
             const Frame& frame = loaded.frames[static_cast<std::size_t>(i)];
-            references.push_back(view_of(frame.reference));
-            sources.push_back(view_of(frame.source));
+            references.push_back(frame.reference.view);
+            sources.push_back(frame.source.view);
         }
         int fits = 0;
         const PlaneDepth plane =

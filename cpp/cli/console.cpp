@@ -8,8 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "xcalib/stream/interrupts.hpp"
+
 namespace xcalib::cli {
 namespace {
+
+constexpr auto kBetweenLines = std::chrono::seconds(10);
 
 std::string one_line(const std::string& text) {
     std::istringstream words(text);
@@ -19,8 +23,6 @@ std::string one_line(const std::string& text) {
 }
 
 }  // namespace
-
-std::atomic<bool> interrupted{false};
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
@@ -72,19 +74,26 @@ void Console::error(int code, const std::string& text) {
 }
 
 void Console::progress(const std::string& stage, double fraction) {
-    if (interrupted) throw Interrupted();
+    check_interrupts();
     show(stage, fraction);
 }
 
-void Console::show(const std::string& stage, double fraction) {
+void Console::show(const std::string& stage, double fraction, const std::string& detail) {
     const int percent = static_cast<int>(100 * fraction);
+    const bool terminal = isatty(STDERR_FILENO);
     {
         const std::lock_guard lock(mutex_);
-        if (quiet || (percent == percent_ && stage == stage_)) return;
+        if (quiet) return;
+        const auto now = std::chrono::steady_clock::now();
+        if (!json && !terminal && !detail.empty() && now - said_ > kBetweenLines) {
+            said_ = now;
+            std::cerr << stage << ": " << detail << std::endl;
+        }
+        if (percent == percent_ && stage == stage_) return;
         percent_ = percent;
         stage_ = stage;
-        if (!json && isatty(STDERR_FILENO)) {
-            std::fprintf(stderr, "\r\033[K%s %3d%%", stage.c_str(), percent);
+        if (!json && terminal) {
+            std::fprintf(stderr, "\r\033[K%s %3d%% %s", stage.c_str(), percent, detail.c_str());
             bar_ = fraction < 1;
             if (!bar_) std::fputs("\r\033[K", stderr);
             std::fflush(stderr);

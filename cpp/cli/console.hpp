@@ -2,7 +2,7 @@
 // all of it as JSON on stdout, an object a line.
 #pragma once
 
-#include <atomic>
+#include <chrono>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
 #include <stdexcept>
@@ -22,14 +22,6 @@ class NotTrusted : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-class Interrupted : public std::runtime_error {
-   public:
-    explicit Interrupted(const std::string& state = "interrupted") : std::runtime_error(state) {}
-};
-
-// Set by Ctrl-C and by a request to end.
-extern std::atomic<bool> interrupted;
-
 class Console {
    public:
     bool json = false;
@@ -41,8 +33,9 @@ class Console {
     void note(const std::string& text);
     void warn(const std::string& text);
     void error(int code, const std::string& text);
-    // `fraction` of `stage`, (0, 1].
-    void show(const std::string& stage, double fraction);
+    // `fraction` of `stage`, (0, 1]. `detail`: more of it, for people; where there is no terminal,
+    // a line now and then.
+    void show(const std::string& stage, double fraction, const std::string& detail = "");
     // The same; throws Interrupted where asked to end.
     void progress(const std::string& stage, double fraction);
 
@@ -51,6 +44,7 @@ class Console {
     bool bar_ = false;  // stands on stderr
     int percent_ = -1;
     std::string stage_;
+    std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
 
     void clear_bar();
     void put(const std::string& text);

@@ -14,8 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-cv::Mat as_mat(Image image) { return cv::Mat(image.pixels, true).reshape(1, image.height); }
-
 std::string type_name(int depth) {
     static const char* const kNames[] = {"uint8", "int8",    "uint16",  "int16",
                                          "int32", "float32", "float64", "float16"};
@@ -25,9 +23,10 @@ std::string type_name(int depth) {
 class Plane : public Depth {
    public:
     explicit Plane(const PlaneDepth& plane) : plane_(plane) {}
-    cv::Mat operator()(int, const cv::Mat& reference) override {
-        return as_mat(plane_(reference.cols, reference.rows));
+    Picture operator()(int, const Picture& reference) override {
+        return picture_of(plane_(reference.view.width, reference.view.height));
     }
+    bool concurrent() const override { return true; }
 
    private:
     PlaneDepth plane_;
@@ -36,17 +35,19 @@ class Plane : public Depth {
 class Files : public Depth {
    public:
     Files(std::vector<Path> paths, double scale) : paths_(std::move(paths)), scale_(scale) {}
-    cv::Mat operator()(int index, const cv::Mat& reference) override {
+    Picture operator()(int index, const Picture& reference) override {
         const Path& path = paths_[static_cast<std::size_t>(index)];
-        cv::Mat depth = read_depth(path, scale_);
-        const long difference = std::labs(static_cast<long>(depth.cols) * reference.rows -
-                                          static_cast<long>(depth.rows) * reference.cols);
-        if (difference > std::max(reference.cols, reference.rows))
-            throw InputError(path.string() + ": depth is " + size_text(depth) +
-                             ", but the reference image is " + size_text(reference) +
+        const Picture depth = picture_of(read_depth(path, scale_));
+        const ImageView &map = depth.view, &image = reference.view;
+        const long difference = std::labs(static_cast<long>(map.width) * image.height -
+                                          static_cast<long>(map.height) * image.width);
+        if (difference > std::max(image.width, image.height))
+            throw InputError(path.string() + ": depth is " + size_text(map) +
+                             ", but the reference image is " + size_text(image) +
                              "; expected the same aspect");
         return depth;
     }
+    bool concurrent() const override { return true; }
     std::vector<Path> files(int index) const override {
         return {paths_[static_cast<std::size_t>(index)]};
     }
@@ -59,9 +60,9 @@ class Files : public Depth {
 class Steadied : public Depth {
    public:
     explicit Steadied(DepthPointer depth) : depth_(std::move(depth)) {}
-    cv::Mat operator()(int index, const cv::Mat& reference) override {
-        const cv::Mat depth = (*depth_)(index, reference);
-        return as_mat(steadier_(index, view_of(depth), view_of(reference)));
+    Picture operator()(int index, const Picture& reference) override {
+        const Picture depth = (*depth_)(index, reference);
+        return picture_of(steadier_(index, depth.view, reference.view));
     }
     std::vector<Path> files(int index) const override { return depth_->files(index); }
     bool steadied() const override { return true; }
@@ -75,11 +76,12 @@ class Completed : public Depth {
    public:
     Completed(DepthPointer depth, double min_confidence)
         : depth_(std::move(depth)), min_confidence_(min_confidence) {}
-    cv::Mat operator()(int index, const cv::Mat& reference) override {
-        const cv::Mat depth = (*depth_)(index, reference);
-        return as_mat(completed(view_of(depth), view_of(reference), min_confidence_));
+    Picture operator()(int index, const Picture& reference) override {
+        const Picture depth = (*depth_)(index, reference);
+        return picture_of(completed(depth.view, reference.view, min_confidence_));
     }
     std::vector<Path> files(int index) const override { return depth_->files(index); }
+    bool concurrent() const override { return depth_->concurrent(); }
     bool steadied() const override { return depth_->steadied(); }
 
    private:

@@ -1,14 +1,13 @@
 // Depth of the reference frames: from files, or from a prior on the road.
 #pragma once
 
-#include <memory>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 #include "options.hpp"
 #include "pictures.hpp"
-#include "xcalib/footage/pairing.hpp"
+#include "xcalib/stream/frames.hpp"
 
 namespace xcalib::cli {
 
@@ -17,18 +16,6 @@ inline const std::vector<std::string> kDepthSuffixes = {".png", ".npy", ".tif", 
 // One depth map, float32 [m], 0 where it is not positive and finite; some pixel must be known.
 // `scale`: metres per count of a 16-bit PNG; .npy, .tiff and .exr are in metres.
 cv::Mat read_depth(const Path& file, double scale);
-
-// Depth of frame `index`, whose reference image is given.
-class Depth {
-   public:
-    virtual ~Depth() = default;
-    virtual cv::Mat operator()(int index, const cv::Mat& reference) = 0;
-    virtual std::vector<Path> files(int) const { return {}; }  // that a frame's is made from
-    // Whether frames must come one by one, in order: those before are a part of each.
-    virtual bool steadied() const { return false; }
-};
-
-using DepthPointer = std::shared_ptr<Depth>;
 
 DepthPointer plane_depth(const PlaneDepth& plane);
 

@@ -13,6 +13,7 @@
 
 #include "console.hpp"
 #include "xcalib/error.hpp"
+#include "xcalib/stream/interrupts.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -129,7 +130,7 @@ std::optional<DepthMap> DepthStream::next() {
     std::unique_lock lock(mutex_);
     while (!changed_.wait_for(lock, std::chrono::milliseconds(100),
                               [&] { return ended_ || !maps_.empty(); }))
-        if (interrupted) return std::nullopt;
+        if (interrupted()) return std::nullopt;
     if (maps_.empty()) {
         if (error_) std::rethrow_exception(error_);
         return std::nullopt;
@@ -146,7 +147,7 @@ std::optional<DepthMap> DepthStream::latest() {
     changed_.notify_all();
     while (!changed_.wait_for(lock, std::chrono::milliseconds(100),
                               [&] { return ended_ || !maps_.empty(); }))
-        if (interrupted) return std::nullopt;
+        if (interrupted()) return std::nullopt;
     if (ended_) {
         if (error_) std::rethrow_exception(error_);
         return std::nullopt;

@@ -15,6 +15,7 @@ extern "C" {
 #include <system_error>
 
 #include "files.hpp"
+#include "pictures.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -41,16 +42,9 @@ const Kind& kind_of(const Path& target) {
     return kinds.at(lower_suffix(target));
 }
 
-AVPixelFormat pixels_of(const cv::Mat& image) {
-    if (image.channels() == 3) return AV_PIX_FMT_BGR24;
-    return image.depth() == CV_16U ? AV_PIX_FMT_GRAY16LE : AV_PIX_FMT_GRAY8;
-}
-
-std::string type_text(const cv::Mat& image) {
-    const char* type = image.depth() == CV_8U    ? "uint8"
-                       : image.depth() == CV_16U ? "uint16"
-                                                 : "float32";
-    return std::string(type) + (image.channels() == 1 ? " gray" : " colour");
+AVPixelFormat pixels_of(const ImageView& image) {
+    if (image.channels == 3) return AV_PIX_FMT_BGR24;
+    return image.type == PixelType::u16 ? AV_PIX_FMT_GRAY16LE : AV_PIX_FMT_GRAY8;
 }
 
 // FFmpeg's errors with the file the user knows.
@@ -91,7 +85,7 @@ struct Delete {
     void operator()(SwsContext* context) const { sws_freeContext(context); }
 };
 using Codec = std::unique_ptr<AVCodecContext, Delete>;
-using Picture = std::unique_ptr<AVFrame, Delete>;
+using RawFrame = std::unique_ptr<AVFrame, Delete>;
 using Packet = std::unique_ptr<AVPacket, Delete>;
 using Scaler = std::unique_ptr<SwsContext, Delete>;
 
@@ -199,38 +193,31 @@ void remove_quietly(const Path& file) {
     fs::remove(file, ignored);
 }
 
-}  // namespace
+class Encoder : public PartWriter {
+   public:
+    Encoder(Path path, Path target, const ImageView& first, double rate);
+    ~Encoder() override;
+    void write(const Picture& image) override;
+    void close(int frames) override;
 
-std::string encoder_name() {
-    const unsigned version = avcodec_version();
-    return "libavcodec " + std::to_string(version >> 16) + "." +
-           std::to_string(version >> 8 & 255) + "." + std::to_string(version & 255);
-}
+   private:
+    struct State;
+    void mux(const ImageView* image);  // none: what is still to come
 
-void check_video_image(const Path& target, const cv::Mat& image) {
-    const std::string suffix = lower_suffix(target);
-    const bool deep = image.type() == CV_16UC1 && suffix == ".mkv";
-    if (image.depth() != CV_8U && !deep)
-        throw InputError(target.string() + ": the images are " + type_text(image) + "; " + suffix +
-                         " holds uint8" + (suffix == ".mkv" ? " and gray uint16" : "") +
-                         ", a folder holds any");
-    if (image.cols % 2 || image.rows % 2)
-        throw InputError(target.string() + ": the images are " + size_text(image) +
-                         "; a video holds even sizes, a folder any");
-}
+    Path path_, target_, partial_;
+    std::unique_ptr<State> state_;
+};
 
 struct Encoder::State {
     Output output;
     Codec codec;
-    Picture given, stored;  // frames as they come, and as the codec takes them
+    RawFrame given, stored;  // frames as they come, and as the codec takes them
     Packet packet;
     Scaler scaler;
-    cv::Size size;
-    int type;
     std::int64_t written = 0, muxed = 0;
 };
 
-Encoder::Encoder(Path path, Path target, const cv::Mat& first, double rate)
+Encoder::Encoder(Path path, Path target, const ImageView& first, double rate)
     : path_(std::move(path)), target_(std::move(target)), partial_(path_.string() + ".partial") {
     av_log_set_level(AV_LOG_QUIET);
     const Kind& kind = kind_of(target_);
@@ -241,18 +228,16 @@ Encoder::Encoder(Path path, Path target, const cv::Mat& first, double rate)
     try {
         state_.reset(new State{{partial_, "matroska", target_},
                                Codec(avcodec_alloc_context3(encoder)),
-                               Picture(av_frame_alloc()),
-                               Picture(av_frame_alloc()),
+                               RawFrame(av_frame_alloc()),
+                               RawFrame(av_frame_alloc()),
                                Packet(av_packet_alloc()),
-                               nullptr,
-                               first.size(),
-                               first.type()});
+                               nullptr});
         State& s = *state_;
         const AVRational frames = rational(rate);
         AVCodecContext* codec = s.codec.get();
         const AVPixelFormat given = pixels_of(first);
-        codec->width = first.cols;
-        codec->height = first.rows;
+        codec->width = first.width;
+        codec->height = first.height;
         codec->time_base = av_inv_q(frames);
         codec->framerate = frames;
         codec->pix_fmt = kind.stored != AV_PIX_FMT_NONE ? kind.stored
@@ -271,10 +256,10 @@ Encoder::Encoder(Path path, Path target, const cv::Mat& first, double rate)
         checked(avcodec_parameters_from_context(stream->codecpar, codec), target_);
         s.output.begin();
         s.stored->format = codec->pix_fmt;
-        s.stored->width = first.cols;
-        s.stored->height = first.rows;
+        s.stored->width = first.width;
+        s.stored->height = first.height;
         checked(av_frame_get_buffer(s.stored.get(), 0), target_);
-        s.scaler.reset(sws_getContext(first.cols, first.rows, given, first.cols, first.rows,
+        s.scaler.reset(sws_getContext(first.width, first.height, given, first.width, first.height,
                                       codec->pix_fmt, SWS_BILINEAR, nullptr, nullptr, nullptr));
         if (!s.scaler) throw std::bad_alloc();
     } catch (...) {
@@ -290,13 +275,13 @@ Encoder::~Encoder() {
     remove_quietly(partial_);
 }
 
-void Encoder::mux(const cv::Mat* image) {
+void Encoder::mux(const ImageView* image) {
     State& s = *state_;
     if (image) {
         checked(av_frame_make_writable(s.stored.get()), target_);
-        const std::uint8_t* rows[] = {image->data};
-        const int strides[] = {static_cast<int>(image->step[0])};
-        sws_scale(s.scaler.get(), rows, strides, 0, image->rows, s.stored->data,
+        const std::uint8_t* rows[] = {image->row<std::uint8_t>(0)};
+        const int strides[] = {static_cast<int>(image->row_bytes)};
+        sws_scale(s.scaler.get(), rows, strides, 0, image->height, s.stored->data,
                   s.stored->linesize);
         s.stored->pts = s.written++;
         s.stored->quality = s.codec->global_quality;
@@ -310,14 +295,7 @@ void Encoder::mux(const cv::Mat* image) {
     }
 }
 
-void Encoder::write(const cv::Mat& image) {
-    // What is not like the first frame would be misread.
-    if (image.size() != state_->size || image.type() != state_->type)
-        throw InputError(target_.string() + ": a frame is " + size_text(image) + " " +
-                         type_text(image) +
-                         ", unlike the first; a video holds frames of one kind, a folder any");
-    mux(&image);
-}
+void Encoder::write(const Picture& image) { mux(&image.view); }
 
 void Encoder::close(int frames) {
     mux(nullptr);
@@ -327,8 +305,25 @@ void Encoder::close(int frames) {
     state_.reset();
 }
 
-void join_videos(const std::vector<std::pair<Path, int>>& parts, const Path& target, double rate,
-                 const std::function<void()>& check) {
+}  // namespace
+
+void FfmpegCodecs::write_image(const Path& file, const Picture& image) {
+    cli::write_image(file, image.view);
+}
+
+std::string FfmpegCodecs::encoder_name() {
+    const unsigned version = avcodec_version();
+    return "libavcodec " + std::to_string(version >> 16) + "." +
+           std::to_string(version >> 8 & 255) + "." + std::to_string(version & 255);
+}
+
+std::unique_ptr<PartWriter> FfmpegCodecs::open_part(const Path& part, const Path& target,
+                                                    const Picture& first, double rate) {
+    return std::make_unique<Encoder>(part, target, first.view, rate);
+}
+
+void FfmpegCodecs::join(const std::vector<std::pair<Path, int>>& parts, const Path& target,
+                        double rate, const std::function<void()>& check) {
     Path partial = parts[0].first;
     partial.replace_filename(target.filename().string() + ".partial");
     int wanted = 0;

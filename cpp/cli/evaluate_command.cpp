@@ -3,9 +3,10 @@
 
 #include "commands.hpp"
 #include "files.hpp"
-#include "frames.hpp"
+#include "open_frames.hpp"
 #include "xcalib/judge/documents.hpp"
 #include "xcalib/rig_file.hpp"
+#include "xcalib/stream/files.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -25,7 +26,7 @@ void run(const Arguments& a, Console& console) {
     std::vector<std::string> files;
     for (int index = 0; index < frames.size(); ++index) {
         const Frame frame = frames.read(index);
-        evaluator.add(view_of(frame.reference), view_of(frame.source), view_of(frame.depth));
+        evaluator.add(frame.reference.view, frame.source.view, frame.depth.view);
         files.push_back(frames.references->where(index));
         console.progress("evaluating", static_cast<double>(index + 1) / frames.size());
     }

@@ -6,9 +6,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
-#include <iterator>
-#include <system_error>
 
 #include "xcalib/error.hpp"
 #include "xcalib/footage/pairing.hpp"
@@ -56,33 +53,6 @@ std::vector<Path> list_files(const Path& folder, const std::vector<std::string>&
     for (const int index : natural_order(names))
         files.push_back(folder / names[static_cast<std::size_t>(index)]);
     return files;
-}
-
-std::string read_file(const Path& file) {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) throw std::system_error(errno, std::generic_category(), file.string());
-    std::string data{std::istreambuf_iterator<char>(in), {}};
-    if (in.bad()) throw std::system_error(EIO, std::generic_category(), file.string());
-    return data;
-}
-
-void write_file(const Path& file, std::string_view data) {
-    if (file.has_parent_path()) fs::create_directories(file.parent_path());
-    Path partial = file;
-    partial.replace_filename("." + file.filename().string() + "." + std::to_string(getpid()) +
-                             ".partial");
-    {
-        std::ofstream out(partial, std::ios::binary);
-        out.write(data.data(), static_cast<std::streamsize>(data.size()));
-        out.close();
-        if (!out) {
-            const int code = errno;
-            std::error_code ignored;
-            fs::remove(partial, ignored);
-            throw std::system_error(code, std::generic_category(), file.string());
-        }
-    }
-    fs::rename(partial, file);
 }
 
 void check_folder_writable(const Path& folder) {

@@ -1,9 +1,8 @@
-// Files and folders: listed in natural order, written whole or not at all.
+// Folders: listed in natural order, and whether they can be written to.
 #pragma once
 
 #include <filesystem>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace xcalib::cli {
@@ -19,12 +18,6 @@ std::vector<Path> list_files(const Path& folder, const std::vector<std::string>&
 
 // In natural order of what they are called.
 std::vector<Path> in_natural_order(std::vector<Path> files);
-
-// Throws std::system_error with the path.
-std::string read_file(const Path& file);
-
-// Appears under its name only when it is complete; its folder is made.
-void write_file(const Path& file, std::string_view data);
 
 // Throw InputError now, before long work, if nothing can be written there. Nothing is made.
 void check_folder_writable(const Path& folder);

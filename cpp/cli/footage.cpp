@@ -3,14 +3,11 @@
 #include <glob.h>
 
 #include <algorithm>
-#include <array>
-#include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <regex>
 
 #include "files.hpp"
 #include "video.hpp"
-#include "xcalib/footage/false_colour.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -37,7 +34,7 @@ class Pages : public Stream {
     Path file(int) const override { return path_; }
 
    private:
-    cv::Mat read(int index) override {
+    Picture read(int index) override {
         std::vector<cv::Mat> pages;
         try {
             cv::imreadmulti(path_.string(), pages, index, 1, cv::IMREAD_UNCHANGED);
@@ -45,68 +42,11 @@ class Pages : public Stream {
             pages.clear();
         }
         if (pages.size() != 1) throw DecodeError(where(index) + ": cannot decode, truncated");
-        return as_image(pages[0], where(index));
+        return picture_of(as_image(pages[0], where(index)));
     }
 
     Path path_;
     int count_ = 0;
-};
-
-// A stream whose frames are changed as they are read.
-class Changed : public Stream {
-   public:
-    explicit Changed(StreamPointer stream) : stream_(std::move(stream)) { times = stream_->times; }
-    int size() const override { return stream_->size(); }
-    std::string name(int index) const override { return stream_->name(index); }
-    std::string where(int index) const override { return stream_->where(index); }
-    Path file(int index) const override { return stream_->file(index); }
-    bool concurrent() const override { return stream_->concurrent(); }
-
-   protected:
-    StreamPointer stream_;
-};
-
-constexpr std::array<const char*, 4> kHalves = {"left", "right", "top", "bottom"};
-
-// A half of every frame: two cameras side by side, or one above the other, in one stream.
-class Part : public Changed {
-   public:
-    Part(StreamPointer stream, std::string half)
-        : Changed(std::move(stream)), half_(std::move(half)) {}
-    std::string where(int index) const override {
-        return stream_->where(index) + " (" + half_ + " half)";
-    }
-
-   private:
-    cv::Mat read(int index) override {
-        const cv::Mat image = (*stream_)[index];
-        const bool beside = half_ == "left" || half_ == "right";
-        const int side = beside ? image.cols : image.rows;
-        if (side % 2)
-            throw InputError(stream_->where(index) + ": its " + (beside ? "width" : "height") +
-                             " is " + std::to_string(side) +
-                             " px, expected an even one to take the " + half_ + " half");
-        const int first = half_ == "left" || half_ == "top" ? 0 : side / 2;
-        const cv::Range range(first, first + side / 2);
-        return (beside ? image.colRange(range) : image.rowRange(range)).clone();
-    }
-
-    std::string half_;
-};
-
-class Inverted : public Changed {
-   public:
-    Inverted(StreamPointer stream, ColorMap map) : Changed(std::move(stream)), map_(map) {}
-
-   private:
-    cv::Mat read(int index) override {
-        const cv::Mat image = (*stream_)[index];
-        if (image.channels() != 3) return image;
-        const std::vector<std::uint8_t> places = map_.invert(view_of(image));
-        return cv::Mat(places, true).reshape(1, image.rows);
-    }
-
-    ColorMap map_;
 };
 
 std::vector<Path> matching_files(const Path& pattern) {
@@ -161,36 +101,6 @@ bool is_bag(const Path& path) {
 
 }  // namespace
 
-std::string six_digits(int index) {
-    const std::string digits = std::to_string(index);
-    return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
-}
-
-cv::Mat Stream::operator[](int index) {
-    cv::Mat image = read(index);
-    const std::lock_guard lock(mutex_);
-    if (first_.empty()) {
-        first_ = where(index);
-        size_ = image.size();
-    }
-    if (image.size() != size_)
-        throw InputError(where(index) + " is " + size_text(image) + ", expected " +
-                         std::to_string(size_.width) + "x" + std::to_string(size_.height) + " as " +
-                         Path(first_).filename().string());
-    return image;
-}
-
-FrameList Stream::frames() const {
-    FrameList list;
-    for (int i = 0; i < size(); ++i) {
-        list.names.push_back(name(i));
-        list.where.push_back(where(i));
-    }
-    list.paths = paths();
-    list.times = times;
-    return list;
-}
-
 ImageFiles::ImageFiles(std::vector<Path> paths) : paths_(std::move(paths)) {
     std::vector<std::string> stems;
     for (const Path& path : paths_) stems.push_back(path.stem().string());
@@ -200,21 +110,13 @@ ImageFiles::ImageFiles(std::vector<Path> paths) : paths_(std::move(paths)) {
             times = read_times(paths_[0].parent_path() / table, *this);
 }
 
-Picked::Picked(StreamPointer stream, std::vector<int> indices)
-    : stream_(std::move(stream)), indices_(std::move(indices)) {
-    if (!stream_->times) return;
-    times.emplace();
-    for (const int index : indices_)
-        times->push_back((*stream_->times)[static_cast<std::size_t>(index)]);
-}
-
 StreamPointer open_stream(const std::string& spec) {
     const Path path(spec);
     const std::size_t hash = spec.rfind('#');
     if (!fs::exists(path) && hash != std::string::npos) {
         const std::string base = spec.substr(0, hash), part = spec.substr(hash + 1);
         if (std::find(kHalves.begin(), kHalves.end(), part) != kHalves.end())
-            return std::make_shared<Part>(open_stream(base), part);
+            return std::make_shared<Half>(open_stream(base), part);
         if (is_bag(base)) refuse_bag(spec);
         throw InputError(spec + ": expected one of #left, #right, #top, #bottom behind a path");
     }
@@ -229,34 +131,6 @@ StreamPointer open_stream(const std::string& spec) {
     }
     // Which says what is wrong with it.
     return std::make_shared<ImageFiles>(list_files(path, kImageSuffixes));
-}
-
-std::vector<double> read_times(const Path& table, const Stream& stream) {
-    std::vector<std::string> names;
-    for (int i = 0; i < stream.size(); ++i) names.push_back(stream.name(i));
-    return times_of_table(read_file(table), table.string(), names);
-}
-
-StreamPointer scalar_sources(StreamPointer sources, const std::string& colormap,
-                             std::string& said) {
-    if (colormap == "none") return sources;
-    if (colormap != "auto")
-        return std::make_shared<Inverted>(std::move(sources), known_color_map(colormap));
-    std::vector<cv::Mat> some;
-    for (const int index : frames_to_recognise_by(sources->size())) {
-        try {
-            some.push_back((*sources)[index]);
-        } catch (const DecodeError&) {
-            // Met again, and named, when its turn comes.
-        }
-    }
-    std::vector<ImageView> views;
-    for (const cv::Mat& image : some) views.push_back(view_of(image));
-    const std::optional<ColorMap> found = recognise(views);
-    if (!found) return sources;
-    said = "source images are false colour (map: " + found->name +
-           "), turned back to numbers; --source-colormap none keeps their colours";
-    return std::make_shared<Inverted>(std::move(sources), *found);
 }
 
 }  // namespace xcalib::cli

@@ -6,11 +6,12 @@
 #include "capture.hpp"
 #include "depth.hpp"
 #include "depth_stream.hpp"
-#include "footage.hpp"
-#include "journal.hpp"
+#include "encoder.hpp"
+#include "pictures.hpp"
 #include "registration.hpp"
 #include "xcalib/depth/complete_depth.hpp"
 #include "xcalib/depth/steady_depth.hpp"
+#include "xcalib/stream/interrupts.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -30,7 +31,7 @@ void check(const RegisterArguments& a) {
 
 }  // namespace
 
-Totals register_live(const RegisterArguments& a, const Rig& rig, Console& console) {
+Registration register_live(const RegisterArguments& a, const Rig& rig, Console& console) {
     check(a);
     Capture references(a.frames.reference), sources(a.frames.source);
     std::unique_ptr<DepthStream> stream;
@@ -39,46 +40,54 @@ Totals register_live(const RegisterArguments& a, const Rig& rig, Console& consol
     // The cameras are there: what another run wrote may go now.
     const Path journal = journal_of(a.output);
     if (std::filesystem::exists(journal)) Journal(journal, {}, true);
-    const std::unique_ptr<Sink> sink = open_sink(a.output, a.rate, nullptr);
+    FfmpegCodecs codecs;
+    const std::unique_ptr<Sink> sink = open_sink(a.output, a.rate, nullptr, codecs);
     sink->begin({});
     std::vector<FrameName> names;
     std::unique_ptr<Registrar> registrar;
     DepthSteadier steadier;
-    Totals totals;
+    Registration totals;
     const auto start = Clock::now();
-    while (!interrupted && (a.max_frames == 0 || totals.frames < a.max_frames)) {
+    while (!interrupted() && (a.max_frames == 0 || totals.frames < a.max_frames)) {
         // Both are taken before either is decoded: as near in time as two calls can be.
         if (!references.grab() || !sources.grab()) break;
-        const cv::Mat reference = references.retrieve(), source = sources.retrieve();
+        const Picture reference = picture_of(references.retrieve()),
+                      source = picture_of(sources.retrieve());
+        Picture depth;
         std::optional<DepthMap> map;
-        if (stream) map = a.depth_sync == "each" ? stream->next() : stream->latest();
-        else map = DepthMap{(*plane)(0, reference), 0};
-        if (!map) break;
-        const auto conditioned = [&map](const Image& depth) {
-            map->depth = cv::Mat(depth.pixels, true).reshape(1, depth.height);
-        };
+        if (stream) {
+            map = a.depth_sync == "each" ? stream->next() : stream->latest();
+            if (!map) break;
+            depth = picture_of(map->depth);
+        } else {
+            depth = (*plane)(0, reference);
+        }
         if (a.frames.depth.steady)
-            conditioned(steadier(totals.frames, view_of(map->depth), view_of(reference)));
+            depth = picture_of(steadier(totals.frames, depth.view, reference.view));
         if (a.frames.depth.complete)
-            conditioned(completed(view_of(map->depth), view_of(reference),
-                                  a.frames.depth.completion_confidence));
+            depth = picture_of(
+                completed(depth.view, reference.view, a.frames.depth.completion_confidence));
         if (!registrar)
-            registrar = std::make_unique<Registrar>(
-                fitted(rig, reference.cols, reference.rows, source.cols, source.rows), a.options);
+            registrar =
+                std::make_unique<Registrar>(fitted(rig, reference.view.width, reference.view.height,
+                                                   source.view.width, source.view.height),
+                                            a.options.registrar);
         const auto before = Clock::now();
-        const Registered result = registered(*registrar, reference, source, map->depth, a.overlays);
+        const Registered result =
+            registered(*registrar, reference, source, depth, a.options.overlays);
         const double took = milliseconds_since(before);
         const std::string name = six_digits(totals.frames);
         names.push_back({name, name});
         sink->write(totals.frames, names.back(), result);
-        const long pixels = static_cast<long>(result.mask.total());
-        const long valid = valid_pixels(result.mask);
+        const long pixels = static_cast<long>(result.mask.view.width) * result.mask.view.height;
+        const long valid = valid_pixels(result.mask.view);
         Json event{{"name", name},
                    {"valid_share", static_cast<double>(valid) / static_cast<double>(pixels)},
                    {"register_ms", took}};
         if (stream) event["depth_timestamp_us"] = map->timestamp_us;
         console.event("frame", event);
         ++totals.frames;
+        ++totals.made;
         totals.valid += valid;
         totals.pixels += pixels;
     }

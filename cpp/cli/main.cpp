@@ -10,18 +10,11 @@
 
 #include "commands.hpp"
 #include "xcalib/error.hpp"
+#include "xcalib/stream/interrupts.hpp"
 
 namespace {
 
 using namespace xcalib::cli;
-
-// Between two frames it does no harm; a second one is not held back.
-void ask_to_end(int signal) {
-    if (interrupted.exchange(true)) {
-        std::signal(signal, SIG_DFL);
-        std::raise(signal);
-    }
-}
 
 constexpr const char* kAbout =
     "Calibrate a fixed pair of cameras, visible and thermal, and register their frames.\n\n"
@@ -61,8 +54,7 @@ int main(int argc, char** argv) {
     setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
     setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 0);  // OpenCV reads EXR on request only
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-    for (const int signal : {SIGINT, SIGTERM})
-        if (std::signal(signal, SIG_IGN) != SIG_IGN) std::signal(signal, ask_to_end);  // nohup
+    const xcalib::Interrupts held;
     std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error like a full disk
     Console console;
     try {

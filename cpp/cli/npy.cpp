@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "files.hpp"
+#include "xcalib/stream/files.hpp"
 
 namespace xcalib::cli {
 namespace {

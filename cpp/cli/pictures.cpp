@@ -5,7 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
-#include "files.hpp"
+#include "xcalib/stream/files.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -40,9 +40,17 @@ ImageView view_of(const cv::Mat& pixels) {
             pixels.channels(), type_of(pixels), static_cast<std::ptrdiff_t>(pixels.step[0])};
 }
 
-MutableImageView mutable_view_of(cv::Mat& pixels) {
-    return {pixels.data,       pixels.cols,     pixels.rows,
-            pixels.channels(), type_of(pixels), static_cast<std::ptrdiff_t>(pixels.step[0])};
+Picture picture_of(const cv::Mat& pixels) {
+    const auto owner = std::make_shared<const cv::Mat>(pixels);
+    return {view_of(*owner), owner};
+}
+
+cv::Mat mat_of(const ImageView& image) {
+    const int depth = image.type == PixelType::u8    ? CV_8U
+                      : image.type == PixelType::u16 ? CV_16U
+                                                     : CV_32F;
+    return {image.height, image.width, CV_MAKETYPE(depth, image.channels),
+            const_cast<void*>(image.data), static_cast<std::size_t>(image.row_bytes)};
 }
 
 cv::Mat as_image(cv::Mat pixels, const std::string& where) {
@@ -86,15 +94,11 @@ cv::Mat decode(const Path& file) {
     return pixels;
 }
 
-void write_image(const Path& file, const cv::Mat& image) {
+void write_image(const Path& file, const ImageView& image) {
     std::vector<std::uint8_t> data;
-    if (!cv::imencode(file.extension().string(), image, data))
+    if (!cv::imencode(file.extension().string(), mat_of(image), data))
         throw std::runtime_error(file.string() + ": cannot encode " + size_text(image));
     write_file(file, {reinterpret_cast<const char*>(data.data()), data.size()});
-}
-
-std::string size_text(const cv::Mat& image) {
-    return std::to_string(image.cols) + "x" + std::to_string(image.rows);
 }
 
 }  // namespace xcalib::cli

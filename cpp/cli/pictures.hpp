@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "xcalib/error.hpp"
-#include "xcalib/image.hpp"
+#include "xcalib/stream/picture.hpp"
 
 namespace xcalib::cli {
 
@@ -16,15 +16,13 @@ using Path = std::filesystem::path;
 inline const std::vector<std::string> kImageSuffixes = {".png", ".jpg",  ".jpeg",
                                                         ".tif", ".tiff", ".bmp"};
 
-// A file that cannot be decoded: truncated, or not what its name says.
-class DecodeError : public InputError {
-    using InputError::InputError;
-};
-
 // The pixels of a matrix of 1 or 3 channels, uint8, uint16 or float32.
 ImageView view_of(const cv::Mat& pixels);
 ImageView view_of(const cv::Mat&& pixels) = delete;
-MutableImageView mutable_view_of(cv::Mat& pixels);
+// The same, which keeps them.
+Picture picture_of(const cv::Mat& pixels);
+// A view as OpenCV sees it, without a copy; nothing may be written to it.
+cv::Mat mat_of(const ImageView& image);
 
 // One image, 1 or 3 channels (an alpha channel is dropped), uint8, uint16 or float32, as it is
 // stored: no rotation by EXIF tags, for a camera's geometry is that of its sensor.
@@ -37,8 +35,6 @@ cv::Mat as_image(cv::Mat pixels, const std::string& where);
 cv::Mat decode(const Path& file);
 
 // By the suffix; whole or not at all, its folder is made.
-void write_image(const Path& file, const cv::Mat& image);
-
-std::string size_text(const cv::Mat& image);  // 640x480
+void write_image(const Path& file, const ImageView& image);
 
 }  // namespace xcalib::cli

@@ -4,6 +4,7 @@
 
 #include "commands.hpp"
 #include "files.hpp"
+#include "open_frames.hpp"
 #include "registration.hpp"
 #include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
@@ -25,15 +26,15 @@ void check_output(const RegisterArguments& a) {
 }
 
 void run(RegisterArguments a, Console& console) {
-    a.options.occlusion = value_of<Occlusion>("--occlusion", a.occlusion);
+    a.options.registrar.occlusion = value_of<Occlusion>("--occlusion", a.occlusion);
     const Rig rig = load_rig(a.rig);
-    Totals totals;
+    Registration totals;
     if (a.live) {
         check_output(a);
         // What a camera shows is not to be had again: there is nothing to go on with.
         std::error_code none;
         const auto noted = std::filesystem::file_size(journal_of(a.output), none);
-        if (!a.overwrite && !none && noted > 0)
+        if (!a.options.overwrite && !none && noted > 0)
             throw InputError(a.output +
                              " holds another run's frames, expected another output, or"
                              " --overwrite");
@@ -45,23 +46,11 @@ void run(RegisterArguments a, Console& console) {
         totals = register_files(a, frames, rig, console);
     }
     const double share = totals.pixels ? static_cast<double>(totals.valid) / totals.pixels : 0.0;
-    const double speed = (totals.frames - totals.earlier) / std::max(totals.seconds, 1e-9);
-    const int made = totals.frames - totals.earlier;
-    std::string line = std::to_string(totals.frames) + " frames";
-    if (totals.earlier) line += " (" + std::to_string(totals.earlier) + " from before)";
-    char text[100];
-    std::snprintf(text, sizeof text, ", %.1f %% valid", 100 * share);
-    line += text;
-    if (made) {
-        std::snprintf(text, sizeof text, ", %.1f frames/s %s", speed,
-                      a.live ? "live" : "with files");
-        line += text;
-    }
-    console.line(line + ": " + a.output);
+    console.line(totals.summary() + (a.live ? " live: " : ": ") + a.output);
     console.result({{"frames", totals.frames},
                     {"earlier", totals.earlier},
                     {"valid_share", share},
-                    {"frames_per_second", made ? Json(speed) : Json(nullptr)},
+                    {"frames_per_second", totals.made ? Json(totals.speed()) : Json(nullptr)},
                     {"output", a.output}});
     if (totals.valid == 0) throw NotTrusted("no pixel of " + a.output + " is valid; see its masks");
 }
@@ -87,11 +76,11 @@ void add_register(CLI::App& app, Console& console) {
                      " masks.")
         ->type_name("OUT")
         ->required();
-    command->add_flag("--overlay", a.overlays, "Also write red-cyan overlays/.");
-    command->add_flag("--overwrite", a.overwrite,
+    command->add_flag("--overlay", a.options.overlays, "Also write red-cyan overlays/.");
+    command->add_flag("--overwrite", a.options.overwrite,
                       "Begin anew.  [default: go on where an interrupted run of the same command"
                       " ended]");
-    command->add_flag("--nearest", a.options.nearest,
+    command->add_flag("--nearest", a.options.registrar.nearest,
                       "Take the nearest source pixel as it is: radiometric counts are never mixed."
                       "  [default: bilinear]");
     command
@@ -101,7 +90,7 @@ void add_register(CLI::App& app, Console& console) {
         ->type_name("HOW")
         ->check(CLI::IsMember(names_of(words<Occlusion>())))
         ->capture_default_str();
-    add_threads(*command, a.options.num_threads);
+    add_threads(*command, a.options.registrar.num_threads);
     CLI::Option* live = command->add_flag("--live", a.live, "REFERENCE and SOURCE are cameras.");
     command
         ->add_option("--depth-fd", a.depth_fd,

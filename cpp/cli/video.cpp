@@ -60,13 +60,13 @@ class Video : public Stream {
         next_ = 0;
     }
 
-    cv::Mat read(int index) override {
+    Picture read(int index) override {
         // Two halves, or a slower partner, ask for the same frame again.
         if (last_ != index) {
             last_image_ = decoded(index);
             last_ = index;
         }
-        return last_image_.clone();
+        return picture_of(last_image_);
     }
 
     // Frames come by decoding on; what lies elsewhere by seeking, believed only if the frame that

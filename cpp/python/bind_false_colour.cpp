@@ -27,10 +27,6 @@ void bind_false_colour(py::module_& m) {
             "The place of each pixel on the curve, 0 to 255: (h, w, 3) to (h, w) uint8. An image "
             "of one channel is returned as it is.");
     m.def("known_color_maps", &known_color_maps, "OpenCV's, and `iron`.");
-    m.def("known_color_map", &known_color_map, py::arg("name"),
-          "Raises InputError that lists the names.");
-    m.def("frames_to_recognise_by", &frames_to_recognise_by, py::arg("count"),
-          "A few of count frames, spread over the footage, rising.");
     m.def(
         "recognise",
         [](const py::sequence& images) {

@@ -15,14 +15,8 @@ void bind_fingerprint(py::module_& m) {
         "fingerprint", [](const std::string& data) { return fingerprint(data); }, py::arg("data"),
         "16 hexadecimal digits of a text, or of bytes: it detects accidental "
         "changes, not intended ones.");
-    m.def(
-        "rig_fingerprint", [](const Rig& rig) { return fingerprint(rig); }, py::arg("rig"),
-        "The fingerprint() of all numbers of a rig.");
     m.def("absolute_path", &absolute_path, py::arg("path"),
           "A path from the root, without `.` and empty parts; `..` and links stay.");
-    m.def("file_stamp", &file_stamp, py::arg("path"),
-          "Where a file is, its size, and the time of its last change; of a folder, those of all "
-          "files in it. A path that cannot be read is itself.");
 }
 
 }  // namespace xcalib

@@ -28,39 +28,10 @@ where names agree only in part or the counts differ.)");
     m.def("times_of_names", &times_of_names, py::arg("names"),
           "Seconds where every name holds one time since 1970 (19, 16 or 13 digits, or seconds "
           "with a fraction) and they rise; None otherwise.");
-    m.def("times_of_table", &times_of_table, py::arg("text"), py::arg("table"), py::arg("names"),
-          R"(Seconds of each name, from the text of a table of `name timestamp` lines.
-
-Names with or without suffix, then a comma, semicolon or blanks; lines of other kinds may only come
-first, # comments anywhere. Times of 19, 16 or 13 digits are nano-, micro- and milliseconds, others
-seconds. Raises InputError that begins with table, the file's name.)");
-    m.def("median_period", &median_period, py::arg("times"),
-          "Median distance of times [s]; 0 for a single one.");
 }
 
 void bind_pairing_classes(py::module_& m) {
-    py::class_<FrameList>(m, "FrameList", "The frames of a camera, without their pixels.")
-        .def(py::init([](std::vector<std::string> names, std::vector<std::string> where,
-                         std::vector<std::filesystem::path> paths,
-                         std::optional<std::vector<double>> times) {
-                 return FrameList{std::move(names), std::move(paths), std::move(times),
-                                  std::move(where)};
-             }),
-             py::arg("names"), py::arg("where"),
-             py::arg("paths") = std::vector<std::filesystem::path>{}, py::arg("times") = py::none(),
-             "names: without suffix; where: for messages; paths: of image files, none for other "
-             "frames; times: seconds, never falling, or None.");
-
     py::class_<Pairing>(m, "Pairing", "Indices into two streams, and how they were found.")
-        .def(
-            py::init([](std::string method, std::vector<int> references, std::vector<int> sources) {
-                Pairing pairing;
-                pairing.method = std::move(method);
-                pairing.references = std::move(references);
-                pairing.sources = std::move(sources);
-                return pairing;
-            }),
-            py::arg("method"), py::arg("references"), py::arg("sources"))
         .def_readonly("method", &Pairing::method, "name, order or time.")
         .def_property_readonly(
             "references", [](const Pairing& p) { return indices_of(p.references); },
@@ -88,22 +59,6 @@ void bind_pairing(py::module_& m) {
 The frames of the stream with fewer of them choose, one after the other, among the frames behind the
 last one chosen. By default max_gap is half the larger median period. Raises InputError where no two
 are near.)");
-    m.def("pair_frames", &pair_frames, py::arg("references"), py::arg("sources"),
-          py::arg("method") = "auto", py::arg("offset") = 0.0, py::arg("max_gap") = py::none(),
-          R"(Pairs two FrameLists.
-
-method: name (pair_files), order (first with first, of equally many), time (pair_times), or auto: by
-time where both have times, else files by name, and others in order. offset [s]: reference time t is
-source time t + offset; not 0: by time. Raises InputError.)");
-    m.def("match_depths", &match_depths, py::arg("references"), py::arg("used"), py::arg("depths"),
-          R"(The depth map, as an index into depths, of each of the references used.
-
-Files under the names of the frames are theirs, and others are left over. Else the nearest in time
-within half a period of the references, where both have times; else by pair_files, of all references or
-of those in use. Raises InputError.)");
-    m.def("nearest_depths", &nearest_depths, py::arg("references"), py::arg("used"),
-          py::arg("depths"), py::arg("where"),
-          "The nearest depth map in time, as match_depths() does it; depths: their times [s].");
 }
 
 }  // namespace xcalib

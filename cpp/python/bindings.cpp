@@ -26,6 +26,9 @@ PYBIND11_MODULE(_core, m) {
     py::register_exception<xcalib::InputError>(m, "InputError", PyExc_ValueError).attr("__doc__") =
         "Input that cannot be used; the message names the file or argument and what was expected.";
 
+    py::register_exception<xcalib::DecodeError>(m, "DecodeError", m.attr("InputError"))
+        .attr("__doc__") = "A file that cannot be decoded: truncated, or not what its name says.";
+
     // In this order: signatures name the classes that are known by then.
     xcalib::bind_camera(m);
     xcalib::bind_calibration_options(m);
@@ -45,6 +48,11 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_fit_plane(m);
     xcalib::bind_complete_depth(m);
     xcalib::bind_steady_depth(m);
+
+    xcalib::bind_stream(m);
+    xcalib::bind_pairs(m);
+    xcalib::bind_frames(m);
+    xcalib::bind_register_frames(m);
 
     xcalib::bind_evaluate(m);
     xcalib::bind_describe(m);

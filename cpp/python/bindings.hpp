@@ -25,6 +25,11 @@ void bind_fit_plane(pybind11::module_& m);
 void bind_complete_depth(pybind11::module_& m);
 void bind_steady_depth(pybind11::module_& m);
 
+void bind_stream(pybind11::module_& m);
+void bind_pairs(pybind11::module_& m);
+void bind_frames(pybind11::module_& m);
+void bind_register_frames(pybind11::module_& m);
+
 void bind_evaluate(pybind11::module_& m);
 void bind_describe(pybind11::module_& m);
 void bind_documents(pybind11::module_& m);

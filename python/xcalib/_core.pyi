@@ -1,13 +1,16 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from numpy import float32, float64, intp, uint8
 from numpy.typing import ArrayLike, NDArray
 
 class InputError(ValueError):
     """Input that cannot be used; the message names the file or argument and what was expected."""
+
+class DecodeError(InputError):
+    """A file that cannot be decoded: truncated, or not what its name says."""
 
 class Pinhole:
     """A pinhole camera, Eq. (intrinsic) of the paper.
@@ -545,14 +548,6 @@ def times_of_names(names: Sequence[str]) -> list[float] | None:
     fraction) and they rise; None otherwise.
     """
 
-def times_of_table(text: str, table: str, names: Sequence[str]) -> list[float]:
-    """Seconds of each name, from the text of a table of `name timestamp` lines.
-
-    Names with or without suffix, then a comma, semicolon or blanks; lines of other kinds may
-    only come first, # comments anywhere. Times of 19, 16 or 13 digits are nano-, micro- and
-    milliseconds, others seconds. Raises InputError that begins with table, the file's name.
-    """
-
 class OffsetEstimate:
     """A clock offset, and what speaks for it."""
     def __init__(
@@ -581,28 +576,6 @@ class OffsetEstimate:
     def line(self) -> str:
         """In one line."""
 
-def motion_edges(image: NDArray[Any]) -> NDArray[float32]:
-    """Magnitude of the gradient of a small gray copy, (h, 160) float32: about 1 on an edge
-    whatever the gain. Pixels that are not finite count as black.
-    """
-
-def estimate_offset(
-    references: Sequence[float],
-    sources: Sequence[float],
-    reference_edges: Callable[[int], NDArray[float32] | None],
-    source_edges: Callable[[int], NDArray[float32] | None],
-    max_offset: float = 2.0,
-    max_frames: int = 1500,
-) -> OffsetEstimate:
-    """A constant offset between the clocks of two streams, neither registered.
-
-    references, sources: times of their frames [s], never falling, each on its own clock.
-    reference_edges, source_edges: motion_edges() of frame i, None where it cannot be decoded.
-    max_offset: the largest looked for, either way [s]; also at most a third of the footage.
-    max_frames: references asked for at most, from the middle of the footage. Raises
-    InputError where the times do not overlap.
-    """
-
 class RefinedOffset:
     """A clock offset chosen by how well frames register, and what speaks for it."""
     @property
@@ -619,78 +592,16 @@ class RefinedOffset:
     def line(self) -> str:
         """In one line."""
 
-def offsets_around(
-    guess: float, references: Sequence[float], sources: Sequence[float]
-) -> list[float]:
-    """Candidates for refine_offset(), from the times of both streams [s]: 6 frames of the faster
-    one either way, in quarters [s].
-    """
-
-class RegisteredNec:
-    """NEC of a reference and a source frame, registered."""
-    def __init__(self, rig: Rig) -> None:
-        """Rescaled to the frames."""
-    def __call__(self, reference: NDArray[Any], source: NDArray[Any], depth: NDArray[Any]) -> float:
-        """In [0, 1]; 0 where no pixel is valid. Frames of one size; depth (h, w) float32 [m], 0
-        unknown.
-        """
-
-def refine_offset(
-    references: Sequence[float],
-    sources: Sequence[float],
-    candidates: Sequence[float],
-    score: Callable[[int, int], float | None],
-    max_frames: int = 12,
-) -> RefinedOffset:
-    """Chooses among candidate offsets [s], rising, around a guess in their middle.
-
-    references, sources: times of their frames [s]. score: the RegisteredNec of a reference
-    and a source frame, by their indices, None where one cannot be decoded. Among the
-    candidates that differ from the best by less than the frames do among each other (two
-    standard errors of the mean), the one nearest to the middle is taken. max_frames: of the
-    slower stream, spread over the footage. Raises InputError without candidates.
-    """
-
 def fingerprint(data: str | bytes) -> str:
     """16 hexadecimal digits of a text, or of bytes: it detects accidental changes, not intended
     ones.
     """
 
-def rig_fingerprint(rig: Rig) -> str:
-    """The fingerprint() of all numbers of a rig."""
-
 def absolute_path(path: str | PathLike[str]) -> Path:
     """A path from the root, without `.` and empty parts; `..` and links stay."""
 
-def file_stamp(path: str | PathLike[str]) -> list[str]:
-    """Where a file is, its size, and the time of its last change; of a folder, those of all
-    files in it. A path that cannot be read is itself.
-    """
-
-def median_period(times: Sequence[float]) -> float:
-    """Median distance of times [s]; 0 for a single one."""
-
-class FrameList:
-    """The frames of a camera, without their pixels."""
-    def __init__(
-        self,
-        names: Sequence[str],
-        where: Sequence[str],
-        paths: Sequence[str | PathLike[str]] = ...,
-        times: Sequence[float] | None = None,
-    ) -> None:
-        """names: without suffix; where: for messages; paths: of image files, none for other
-        frames; times: seconds, never falling, or None.
-        """
-
 class Pairing:
     """Indices into two streams, and how they were found."""
-    def __init__(
-        self,
-        method: str,
-        references: Sequence[int] | NDArray[intp],
-        sources: Sequence[int] | NDArray[intp],
-    ) -> None: ...
     @property
     def method(self) -> str:
         """name, order or time."""
@@ -724,33 +635,6 @@ def pair_times(
     behind the last one chosen. By default max_gap is half the larger median period. Raises
     InputError where no two are near.
     """
-
-def pair_frames(
-    references: FrameList,
-    sources: FrameList,
-    method: str = "auto",
-    offset: float = 0.0,
-    max_gap: float | None = None,
-) -> Pairing:
-    """Pairs two FrameLists.
-
-    method: name (pair_files), order (first with first, of equally many), time (pair_times),
-    or auto: by time where both have times, else files by name, and others in order. offset
-    [s]: reference time t is source time t + offset; not 0: by time. Raises InputError.
-    """
-
-def match_depths(references: FrameList, used: Sequence[int], depths: FrameList) -> list[int]:
-    """The depth map, as an index into depths, of each of the references used.
-
-    Files under the names of the frames are theirs, and others are left over. Else the nearest
-    in time within half a period of the references, where both have times; else by pair_files,
-    of all references or of those in use. Raises InputError.
-    """
-
-def nearest_depths(
-    references: FrameList, used: Sequence[int], depths: Sequence[float], where: str
-) -> list[int]:
-    """The nearest depth map in time, as match_depths() does it; depths: their times [s]."""
 
 def frames_to_look_at(count: int, max_frames: int, seed: int) -> list[int]:
     """Indices of the frames, of count, that a choice of max_frames looks at: four of each
@@ -826,12 +710,6 @@ class ColorMap:
 
 def known_color_maps() -> list[ColorMap]:
     """OpenCV's, and `iron`."""
-
-def known_color_map(name: str) -> ColorMap:
-    """Raises InputError that lists the names."""
-
-def frames_to_recognise_by(count: int) -> list[int]:
-    """A few of count frames, spread over the footage, rising."""
 
 def recognise(images: Sequence[NDArray[Any]]) -> ColorMap | None:
     """The ColorMap of false-colour images of one camera, or None if they are none.
@@ -1017,4 +895,228 @@ def overlay(
 
     Where the other is not valid (mask (H, W), nonzero where it is) the reference alone is
     shown, in gray.
+    """
+
+class Stream:
+    """A sized sequence of frames, each read at the moment of access, all of one size.
+
+    Only names and times are held, so that memory does not grow with the pixels of the
+    footage. A slice is a stream again. A class of streams calls super().__init__() and has
+    __len__, name(index), where(index) and read(index): frame 0 <= index < len, (H, W) or (H,
+    W, 3), uint8, uint16 or float32; file(index) where that is not where(index); and parallel
+    = True if several threads may read.
+    """
+    def __init__(self) -> None: ...
+    def __len__(self) -> int: ...
+    @overload
+    def __getitem__(self, index: int) -> NDArray[Any]: ...
+    @overload
+    def __getitem__(self, indices: slice) -> Stream: ...
+    def __iter__(self) -> Iterator[NDArray[Any]]: ...
+    def name(self, index: int) -> str:
+        """What a file made from the frame is called, without suffix."""
+    def where(self, index: int) -> str:
+        """Where the frame is, for messages: a file, or a file and the frame's number."""
+    def file(self, index: int) -> Path:
+        """The file that the frame is in, or the folder of a bag."""
+    @property
+    def parallel(self) -> bool:
+        """Whether several threads may read at a time."""
+    times: NDArray[float64] | None
+    """(N,) seconds of the frames, never falling; None where unknown. Each stream has its
+        clock.
+        """
+
+class Picked(Stream):
+    """Some frames of a stream, in order."""
+    def __init__(self, stream: Stream, indices: Sequence[int]) -> None: ...
+
+class Half(Stream):
+    """A half of every frame: two cameras side by side, or one above the other, in one stream."""
+    def __init__(self, stream: Stream, half: str) -> None:
+        """half: left, right, top or bottom."""
+
+def read_times(table: str | PathLike[str], stream: Stream) -> list[float]:
+    """Seconds of the frames of a stream from a file of `name timestamp` lines, see
+    times_of_table().
+    """
+
+def scalar_sources(images: Stream, colormap: str = "auto") -> tuple[Stream, str]:
+    """Source images with false colour turned back to numbers, and a line that says so, or ''.
+
+    colormap: auto (a few frames, spread over the footage, are read to decide), none (images
+    as they are), or the name of a known map.
+    """
+
+def pair_streams(
+    references: Stream,
+    sources: Stream,
+    method: str = "auto",
+    offset: float = 0.0,
+    max_gap: float | None = None,
+) -> Pairing:
+    """Pairs two streams.
+
+    method: name (pair_files), order (first with first, of equally many), time (pair_times),
+    or auto: by time where both have times, else files by name, and others in order. offset
+    [s]: reference time t is source time t + offset; not 0: by time. Raises InputError.
+    """
+
+def match_depths(references: Stream, used: Sequence[int], depths: Stream) -> list[int]:
+    """The depth file, as an index into depths, of each of the references used.
+
+    Files under the names of the frames are theirs, and others are left over. Else the nearest
+    in time within half a period of the references, where both tell it; else by pair_files, of
+    all references or of those in use. Raises InputError.
+    """
+
+def nearest_depths(references: Stream, used: Sequence[int], depths: Stream) -> list[int]:
+    """The nearest depth map in time, as match_depths() does it, of streams with times."""
+
+def estimate_offset(
+    references: Stream, sources: Stream, max_offset: float = 2.0, max_frames: int = 1500
+) -> OffsetEstimate:
+    """A constant offset between the clocks of two streams with times, neither registered.
+
+    max_offset: the largest looked for, either way [s]; also at most a third of the footage.
+    max_frames: references read at most, from the middle of the footage. Raises InputError
+    where the times do not overlap.
+    """
+
+def offsets_around(guess: float, references: Stream, sources: Stream) -> list[float]:
+    """Candidates for refine_offset(): 6 frames of the faster stream either way, in quarters [s]."""
+
+def refine_offset(
+    rig: Rig,
+    references: Stream,
+    sources: Stream,
+    depth: Any,
+    candidates: Sequence[float],
+    max_frames: int = 12,
+) -> RefinedOffset:
+    """Chooses among candidate offsets by how well the frames register with a rig.
+
+    candidates [s], rising, around a guess in their middle. Of those that differ from the best
+    by less than the frames do among each other (two standard errors of the mean), the one
+    nearest to the middle is taken: the guess, unless the frames speak against it. Candidates
+    that pair the same frames score the same. max_frames: frames of the slower stream judged,
+    spread over the footage, the same ones for every candidate; those that cannot be decoded
+    are left out. Raises InputError without candidates or times.
+    """
+
+class Pairs:
+    """Two streams, and which of their frames belong together."""
+    def __init__(
+        self,
+        references: Stream,
+        sources: Stream,
+        method: str = "auto",
+        time_offset: float | None = 0.0,
+        max_gap: float | None = None,
+        reference_times: str | PathLike[str] | None = None,
+        source_times: str | PathLike[str] | None = None,
+        estimate: OffsetEstimate | None = None,
+    ) -> None:
+        """As pair_streams(); time_offset None: estimated. The tables are read by read_times().
+        Nothing else is read, save that an offset to be estimated, unless there is an
+        estimate, needs the frames.
+        """
+    def refine(self, rig: Rig, open_depth: Callable[[list[int]], Any]) -> None:
+        """Pairs anew with the offset at which frames register best with the rig.
+        open_depth(used): the provider of the depth of these of all references. Without an
+        estimated offset the pairs stay as they are, and so they do where the registered
+        frames tell neither around the estimate nor around 0.
+        """
+    @property
+    def references(self) -> Stream:
+        """Those that have a partner."""
+    @property
+    def sources(self) -> Stream:
+        """Their partners, in the same order."""
+    @property
+    def all_references(self) -> Stream:
+        """With those that do not."""
+    @property
+    def pairing(self) -> Pairing:
+        """Indices into the streams."""
+    @property
+    def notes(self) -> list[str]:
+        """What the user should know, a line each."""
+
+def is_video(output: str | PathLike[str]) -> bool:
+    """Whether an output of this name is a video."""
+
+def journal_of(output: str | PathLike[str]) -> Path:
+    """Where the journal of an output is: in the folder, or beside the video, named after it."""
+
+def load_frames(
+    references: Stream,
+    sources: Stream,
+    depth: Any,
+    chosen: Sequence[int],
+    told: Callable[[int], object],
+) -> tuple[list[int], list[NDArray[Any]], list[NDArray[Any]], list[NDArray[float32]], str]:
+    """(indices, references, sources, depths, line) of the chosen frames, in memory.
+
+    Those that cannot be decoded are left out, and line says how many, or is ''; if none is
+    left, raises DecodeError of the first. told(done) is called after each.
+    """
+
+def left_out(count: int, first: str) -> str:
+    """The warning that frames were left out of a calibration, and why the first was."""
+
+def with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str:
+    """The message with the file that the core, which sees arrays only, calls `frame N`."""
+
+class Registration:
+    """How far a stream is registered, and its totals."""
+    @property
+    def frames(self) -> int:
+        """Of the stream."""
+    @property
+    def earlier(self) -> int:
+        """That were there from an earlier run."""
+    @property
+    def made(self) -> int:
+        """That this run has made."""
+    @property
+    def valid(self) -> int:
+        """Valid pixels of the frames of either."""
+    @property
+    def pixels(self) -> int:
+        """Of all frames."""
+    @property
+    def seconds(self) -> float:
+        """That this run took so far."""
+    @property
+    def busy(self) -> dict[str, float]:
+        """Share of that time, [0, 1], that each stage was at work, by name."""
+    def line(self) -> str:
+        """While it is under way, in one line."""
+    def summary(self) -> str:
+        """At its end, in one line."""
+
+def register_frames(
+    references: Stream,
+    sources: Stream,
+    depth: Any,
+    registrar: Registrar,
+    output: str | PathLike[str],
+    overlays: bool,
+    overwrite: bool,
+    part_frames: int,
+    inputs: Sequence[tuple[str, str]],
+    codecs: object,
+    told: Callable[[Registration], object],
+    hold_interrupts: bool,
+) -> Registration:
+    """Registers all frames that an earlier run has not written, and returns the Registration.
+
+    registrar: with a rig and options to register by; its threads are those of the whole run.
+    part_frames: of a video, that a run that is killed can lose at most. inputs: (name, text)
+    of all that the frames were opened with; an output of others is refused. codecs: has
+    write_image(file, image), encoder_name(), Encoder(part, target, first, rate) and
+    join(parts, target, rate, check). told(registration) is called in this thread after
+    frames, and a few times a second. hold_interrupts: in the main thread, SIGINT and SIGTERM
+    end the run between two frames, by KeyboardInterrupt.
     """

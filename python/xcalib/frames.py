@@ -21,7 +21,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ._core import InputError, Rig, display_gray, natural_order, overlay, pair_files
+from ._core import (
+    DecodeError,
+    InputError,
+    Rig,
+    display_gray,
+    natural_order,
+    overlay,
+    pair_files,
+)
 from .whole_file import WholeFile
 
 Image = NDArray[Any]
@@ -54,10 +62,6 @@ __all__ = [
 ]
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
-
-
-class DecodeError(InputError):
-    """A file that cannot be decoded: truncated, or not what its name says."""
 
 
 # -- Names ---------------------------------------------------------------------------------------

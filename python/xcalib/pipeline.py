@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -21,11 +20,13 @@ from ._core import (
     calibrate,
     draw_frames,
     frames_to_judge_plane,
+    load_frames,
+    with_file_name,
 )
 from .choose import choose_informed
 from .depth import DepthProvider, FolderDepth, PlaneDepth
 from .flow import FlowProvider
-from .footage import Pairs, Stream, TopicDepth, open_pairs
+from .footage import Stream, TopicDepth, open_matched_depth, open_pairs
 from .footage.opening import PickedDepth
 from .frames import DecodeError, Image, InputError, fit_rig, size_of
 from .inputs import Inputs
@@ -55,13 +56,19 @@ class Frames:
     @staticmethod
     def open(inputs: Inputs, rig: Rig | None = None) -> Frames:
         """Open and pair frames. With a ``rig`` an estimated clock offset is refined, see
-        `Pairs.refined`.
+        `Pairs.refine`.
         """
         pairs = open_pairs(inputs.reference, inputs.source, inputs.matching)
 
-        def open_depth(pairs: Pairs) -> DepthProvider:
-            depth = pairs.open_depth(
-                str(inputs.depth), inputs.depth_scale, inputs.plane, inputs.network, inputs.measured
+        def open_depth(used: list[int]) -> DepthProvider:
+            depth = open_matched_depth(
+                pairs.all_references,
+                used,
+                str(inputs.depth),
+                inputs.depth_scale,
+                inputs.plane,
+                inputs.network,
+                inputs.measured,
             )
             network = depth.relative
             if network is not None and rig is not None:
@@ -69,10 +76,10 @@ class Frames:
             return depth
 
         if rig is not None:
-            pairs = pairs.refined(rig, open_depth)
-        depth = open_depth(pairs)
+            pairs.refine(rig, open_depth)
+        depth = open_depth(pairs.pairing.references.tolist())
         note = misfit(depth, rig) if rig is not None else ""
-        notes = (*pairs.notes, note) if note else pairs.notes
+        notes = (*pairs.notes, note) if note else tuple(pairs.notes)
         return Frames(pairs.references, pairs.sources, depth, notes)
 
     def __len__(self) -> int:
@@ -147,20 +154,12 @@ def run_calibration(
         start = initial.relative_depth if initial is not None else None
         start = start or network.pooled(_readable(frames.references, chosen))
         calibration.relative_depth = network.relative_depth = start
-    loaded: list[tuple[int, tuple[Image, Image, NDArray[np.float32]]]] = []
-    failures: list[DecodeError] = []
-    for index in progress(chosen, len(chosen), "loading", quiet):
-        try:
-            loaded.append((index, frames.read(index)))
-        except DecodeError as error:
-            failures.append(error)
-    if not loaded:
-        raise failures[0] if failures else InputError("no frame to calibrate on")
-    if failures:
-        warn(left_out(len(failures), str(failures[0])))
-    chosen = [index for index, _ in loaded]
-    references, sources, depths = zip(*(frame for _, frame in loaded), strict=True)
-    del loaded
+    loading = progress(range(len(chosen)), len(chosen), "loading", quiet)
+    chosen, references, sources, depths, line = load_frames(
+        frames.references, frames.sources, frames.depth, chosen, lambda _: next(loading, None)
+    )
+    if line:
+        warn(line)
     if prepare is not None:
         prepare(calibration, references[0], sources[0])
     if initial is not None:
@@ -180,7 +179,7 @@ def run_calibration(
         try:
             result = calibrate(references, sources, depths, initial, calibration, show, flow)
         except ValueError as error:
-            raise InputError(_with_file_name(str(error), frames.references, chosen)) from None
+            raise InputError(with_file_name(str(error), frames.references, chosen)) from None
     return result, chosen
 
 
@@ -213,19 +212,6 @@ def with_fitted_plane(
     with tqdm(desc="plane", unit="fit", disable=True if quiet else None, leave=False) as bar:
         fitted = plane.fitted(references, sources, rig, calibration, bar.update)
     return replace(frames, depth=fitted), fitted
-
-
-def left_out(count: int, first: str) -> str:
-    """The warning that frames were left out of a calibration."""
-    return f"{count} unusable {'frame is' if count == 1 else 'frames are'} left out; {first}"
-
-
-def _with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str:
-    """The message with the file that the core, which sees arrays only, calls ``frame N``."""
-    found = re.search(r"\bframe (\d+)\b", message)
-    if not found or int(found[1]) >= len(chosen):
-        return message
-    return f"{message} (frame {found[1]} is {images.where(chosen[int(found[1])])})"
 
 
 def save_rig(rig: Rig, path: Path) -> None:

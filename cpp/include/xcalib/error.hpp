@@ -13,4 +13,10 @@ class InputError : public std::invalid_argument {
     using std::invalid_argument::invalid_argument;
 };
 
+// A file that cannot be decoded: truncated, or not what its name says.
+class DecodeError : public InputError {
+   public:
+    using InputError::InputError;
+};
+
 }  // namespace xcalib

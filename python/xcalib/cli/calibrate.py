@@ -8,10 +8,17 @@ from typing import Any
 
 import click
 
-from .._core import CalibrationOptions, Pinhole, Rig, _flow_arguments, report_document
+from .._core import (
+    CalibrationOptions,
+    Pinhole,
+    Rig,
+    _flow_arguments,
+    left_out,
+    report_document,
+)
 from ..flow import FlowProvider, NetworkFlow
 from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
-from ..pipeline import choose_by_content, left_out, run_calibration, save_rig, with_fitted_plane
+from ..pipeline import choose_by_content, run_calibration, save_rig, with_fitted_plane
 from .arguments import (
     DEFAULTS,
     SEED,

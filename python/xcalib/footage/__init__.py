@@ -7,33 +7,40 @@
 
 from __future__ import annotations
 
+from .._core import (
+    OffsetEstimate,
+    Pairs,
+    RefinedOffset,
+    estimate_offset,
+    is_video,
+    journal_of,
+    offsets_around,
+    read_times,
+    refine_offset,
+)
 from .bag import BagImages, CameraInfo, camera_infos, is_bag
 from .depth_topic import TopicDepth
 from .files import ImageFiles, Pages
-from .offset import OffsetEstimate, RefinedOffset, estimate_offset, offsets_around, refine_offset
-from .opening import Matching, Pairs, open_pairs
+from .opening import Matching, open_matched_depth, open_pairs
 from .pairing import METHODS, Pairing, match_depths, pair_streams, pair_times
 from .sources import open_stream
-from .stream import Part, Picked, Stream
-from .times import read_times
+from .stream import Half, Picked, Stream
 from .video import VIDEO_SUFFIXES, Video
-from .writer import Sink, is_video, journal_of, open_sink
 
 __all__ = [
     "METHODS",
     "VIDEO_SUFFIXES",
     "BagImages",
     "CameraInfo",
+    "Half",
     "ImageFiles",
     "Matching",
     "OffsetEstimate",
     "Pages",
     "Pairing",
     "Pairs",
-    "Part",
     "Picked",
     "RefinedOffset",
-    "Sink",
     "Stream",
     "TopicDepth",
     "Video",
@@ -44,8 +51,8 @@ __all__ = [
     "journal_of",
     "match_depths",
     "offsets_around",
+    "open_matched_depth",
     "open_pairs",
-    "open_sink",
     "open_stream",
     "pair_streams",
     "pair_times",

@@ -60,6 +60,7 @@ class BagImages(Stream):
     """The images of one topic; their times are the header stamps, else the times of recording."""
 
     def __init__(self, path: Path, topic: str) -> None:
+        super().__init__()
         self.path = path
         self._bag = _opened(path)
         self.topic, self._kind = _image_topic(self._bag, path, topic)

@@ -1,7 +1,7 @@
-"""Videos written through PyAV, FFmpeg's libraries: encoded, checked, and joined without decoding.
+"""What compresses for `register_frames`: images through OpenCV, videos through PyAV.
 
-OpenCV writes videos too, but tells of no error (a full disk leaves half a video behind), and cannot
-copy compressed frames from one file to another.
+PyAV is FFmpeg's libraries. OpenCV writes videos too, but tells of no error (a full disk leaves half
+a video behind), and cannot copy compressed frames from one file to another.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ import av
 import numpy as np
 from av import library_versions
 
-from ..frames import Image, InputError, size_of
+from ..frames import Image, size_of, write_image
 from ..whole_file import WholeFile
+
+__all__ = ["Encoder", "encoder_name", "join", "write_image"]
 
 # Container, codec and the pixels it stores; None: as they are. The quantizer of the lossy ones is
 # fixed, so that a frame's quality does not depend on where a part began.
@@ -28,8 +30,6 @@ _KINDS: dict[str, tuple[str, str, str | None, dict[str, str]]] = {
     # Slices are coded by threads of their own, and must be as many in all parts.
     ".mkv": ("matroska", "ffv1", None, {"level": "3", "slices": "4"}),
 }
-SUFFIXES = tuple(_KINDS)
-
 # How arrays are called by their type and number of dimensions, and what FFV1 stores them as.
 _PIXELS = {("uint8", 2): "gray", ("uint16", 2): "gray16le", ("uint8", 3): "bgr24"}
 _LOSSLESS = {"gray": "gray", "gray16le": "gray16le", "bgr24": "bgr0"}
@@ -38,28 +38,6 @@ _LOSSLESS = {"gray": "gray", "gray16le": "gray16le", "bgr24": "bgr0"}
 def encoder_name() -> str:
     """The library that compresses, and its version: parts of a video are of one."""
     return f"libavcodec {'.'.join(map(str, library_versions['libavcodec']))}"
-
-
-def check_image(path: Path, image: Image) -> None:
-    """Raise `InputError` if a video of this name cannot hold the image.
-
-    .mp4 and .avi hold 8-bit images, compressed with loss; .mkv holds 8-bit and 16-bit gray images
-    without loss (FFV1). No video holds float32 or 16-bit colour, nor odd sizes.
-    """
-    suffix = path.suffix.lower()
-    deep = image.dtype == np.uint16 and image.ndim == 2 and suffix == ".mkv"
-    if image.dtype != np.uint8 and not deep:
-        kind = f"{image.dtype} {'gray' if image.ndim == 2 else 'colour'}"
-        raise InputError(
-            f"{path}: the images are {kind}; {suffix} holds uint8"
-            + (" and gray uint16" if suffix == ".mkv" else "")
-            + ", a folder holds any"
-        )
-    width, height = size_of(image)
-    if width % 2 or height % 2:
-        raise InputError(
-            f"{path}: the images are {width}x{height}; a video holds even sizes, a folder any"
-        )
 
 
 class Encoder:
@@ -80,7 +58,6 @@ class Encoder:
     def __init__(self, path: Path, target: Path, first: Image, rate: float) -> None:
         self.path, self.target = path, target
         self._file = WholeFile(path)
-        self._like = (*first.shape, str(first.dtype))
         self._pixels = _PIXELS[str(first.dtype), first.ndim]
         self._frames = 0
         stored = _KINDS[target.suffix.lower()][2]
@@ -92,12 +69,6 @@ class Encoder:
 
     def write(self, image: Image) -> None:
         """Add a frame."""
-        kind = (*image.shape, str(image.dtype))
-        if kind != self._like:
-            raise InputError(
-                f"{self.target}: a frame is {kind}, the first is {self._like}; a video holds"
-                " frames of one kind, a folder any"
-            )
         with _named(self.target):
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format=self._pixels)
             frame.pts = self._frames

@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .._core import natural_order, times_of_names
+from .._core import natural_order, read_times, times_of_names
 from ..frames import (
     IMAGE_SUFFIXES,
     DecodeError,
@@ -23,7 +23,6 @@ from ..frames import (
     read_image,
 )
 from .stream import Stream
-from .times import read_times
 
 TIME_TABLES = ("timestamps.csv", "timestamps.txt")
 """Read, if there, from the folder of the images."""
@@ -35,12 +34,13 @@ class ImageFiles(Stream):
     parallel = True
 
     def __init__(self, paths: Sequence[Path]) -> None:
+        super().__init__()
         self.paths = list(paths)
         times = times_of_names([path.stem for path in self.paths])
         self.times = None if times is None else np.array(times)
         for table in TIME_TABLES:
             if self.paths and (self.paths[0].parent / table).is_file():
-                self.times = read_times(self.paths[0].parent / table, self)
+                self.times = np.array(read_times(self.paths[0].parent / table, self))
 
     def __len__(self) -> int:
         return len(self.paths)
@@ -82,6 +82,7 @@ class Pages(Stream):
     parallel = True
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
         with quiet_opencv():
             self._count = cv2.imcount(str(path), cv2.IMREAD_UNCHANGED)

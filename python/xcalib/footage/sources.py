@@ -7,7 +7,7 @@ from pathlib import Path
 from ..frames import InputError, list_files
 from .bag import BagImages, is_bag
 from .files import ImageFiles, open_files
-from .stream import Part, Stream
+from .stream import HALVES, Half, Stream
 from .video import VIDEO_SUFFIXES, Video
 
 
@@ -22,13 +22,13 @@ def open_stream(spec: str | Path) -> Stream:
     text = str(spec)
     if not Path(text).exists() and "#" in text:
         base, _, part = text.rpartition("#")
-        if part in Part.HALVES:
-            return Part(open_stream(base), part)
+        if part in HALVES:
+            return Half(open_stream(base), part)
         if is_bag(Path(base)):
             return BagImages(Path(base), part)
         raise InputError(
             f"{text}: expected #TOPIC behind a bag, or one of"
-            f" {', '.join('#' + half for half in Part.HALVES)}"
+            f" {', '.join('#' + half for half in HALVES)}"
         )
     path = Path(text)
     if is_bag(path):

@@ -32,6 +32,7 @@ class Video(Stream):
     """Frames ahead that are reached by decoding on rather than by seeking."""
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
         self._capture = self._open()
         format_code = int(self._capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT)) & 0xFFFFFFFF

@@ -1,5 +1,5 @@
-// What of an output is done, so that an interrupted run can be taken up again, by this command or
-// by the Python one.
+// What of an output is done, so that an interrupted run can be taken up again by the command that
+// began it.
 //
 // A text file beside the output: a line of JSON on how the output is made, then a line for each
 // unit of whole files: which frames they hold, and their sizes. A line is written after its files
@@ -7,14 +7,15 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "files.hpp"
+#include "xcalib/export.hpp"
 
-namespace xcalib::cli {
+namespace XCALIB_EXPORT xcalib {
 
 // Files that are whole only together.
 struct Unit {
@@ -22,18 +23,19 @@ struct Unit {
     std::vector<std::pair<std::string, std::uintmax_t>> files;  // beside the journal [bytes]
 };
 
-// By name, in the order in which differences are told.
+// All that decides what an output is, apart from the frames themselves: text by name, in the order
+// in which differences are told. `command` names the program: each describes its inputs in its own
+// words, so that one does not go on with what another began.
 using MadeWith = std::vector<std::pair<std::string, std::string>>;
 
 // The journal of one output, held by one process at a time. Until there is a first unit the file is
 // empty, and goes when it is closed.
 class Journal {
    public:
-    // The folder is made where there is none. `made_with`: all that decides what the output is,
-    // apart from the frames themselves. `overwrite`: remove what is there instead of going on from
-    // it. Throws InputError where what is there was made otherwise, is not a journal, or another
-    // process is at it.
-    Journal(Path path, const MadeWith& made_with, bool overwrite);
+    // The folder is made where there is none. `overwrite`: remove what is there instead of going on
+    // from it. Throws InputError where what is there was made otherwise, is not a journal, or
+    // another process is at it.
+    Journal(std::filesystem::path path, const MadeWith& made_with, bool overwrite = false);
     ~Journal();
     Journal(const Journal&) = delete;
     Journal& operator=(const Journal&) = delete;
@@ -41,7 +43,7 @@ class Journal {
     // Whose files are all there, in the size that they were written.
     const std::vector<Unit>& units() const { return units_; }
 
-    // Notes that the files of these names are whole; from any thread.
+    // Notes that the files of these names, beside the journal, are whole; from any thread.
     void append(std::vector<std::pair<std::string, long>> frames,
                 const std::vector<std::string>& files);
 
@@ -51,12 +53,12 @@ class Journal {
     void load(const MadeWith& made_with, bool overwrite);
     void write(const std::string& line);
 
-    Path path_;
+    std::filesystem::path path_;
     std::string first_;
-    std::vector<Path> made_folders_;  // deepest first
+    std::vector<std::filesystem::path> made_folders_;  // deepest first
     std::vector<Unit> units_;
     std::mutex mutex_;
     int descriptor_ = -1;
 };
 
-}  // namespace xcalib::cli
+}  // namespace xcalib

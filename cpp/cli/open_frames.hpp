@@ -1,27 +1,14 @@
-// Paired frames, opened but not read.
+// Frames as the arguments of the commands name them.
 #pragma once
 
 #include "console.hpp"
-#include "depth.hpp"
-#include "footage.hpp"
 #include "options.hpp"
 #include "xcalib/camera.hpp"
+#include "xcalib/stream/frames.hpp"
 
 namespace xcalib::cli {
 
-struct Frame {
-    cv::Mat reference, source, depth;
-};
-
-struct Frames {
-    StreamPointer references, sources;
-    DepthPointer depth;
-
-    int size() const { return references->size(); }
-    Frame read(int index) const;
-};
-
-// What the arguments name; how frames were paired by time is told on the console.
+// Paired; how, where that was by time, is told on the console.
 Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& rig,
                    Console& console);
 

@@ -1,4 +1,4 @@
-#include "journal.hpp"
+#include "xcalib/stream/journal.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -12,11 +12,13 @@
 #include <system_error>
 
 #include "xcalib/error.hpp"
+#include "xcalib/stream/files.hpp"
 
-namespace xcalib::cli {
+namespace xcalib {
 namespace {
 
 namespace fs = std::filesystem;
+using Path = fs::path;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "xcalib-register";
@@ -50,12 +52,12 @@ Unit unit_of(const std::string& line) {
     return unit;
 }
 
-// Of values by name: the first that are not the same.
+// Of values by name: the first that are not the same; of another command's that alone.
 std::string differences(const Json& before, const Json& now) {
     std::string text;
     int count = 0;
     const auto value = [](const Json& values, const std::string& name) {
-        if (!values.contains(name)) return std::string("None");
+        if (!values.contains(name)) return std::string("none");
         return values[name].is_string() ? values[name].get<std::string>() : dumped(values[name]);
     };
     const auto compare = [&](const std::string& name) {
@@ -63,6 +65,8 @@ std::string differences(const Json& before, const Json& now) {
         if (old_value == new_value || ++count > 3) return;
         text += (text.empty() ? "" : ", ") + name + " " + old_value + ", now " + new_value;
     };
+    compare("command");
+    if (count) return text;
     for (const auto& [name, unused] : before.items()) compare(name);
     for (const auto& [name, unused] : now.items())
         if (!before.contains(name)) compare(name);
@@ -200,4 +204,4 @@ void Journal::load(const MadeWith& made_with, bool overwrite) {
     std::copy_if(units.begin(), units.end(), std::back_inserter(units_), is_whole);
 }
 
-}  // namespace xcalib::cli
+}  // namespace xcalib

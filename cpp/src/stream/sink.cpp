@@ -1,19 +1,37 @@
-#include "sink.hpp"
+#include "xcalib/stream/sink.hpp"
 
 #include <algorithm>
 #include <set>
+#include <stdexcept>
 
-#include "encoder.hpp"
-#include "files.hpp"
+#include "xcalib/error.hpp"
 
-namespace xcalib::cli {
+namespace xcalib {
 namespace {
 
 namespace fs = std::filesystem;
+using Path = fs::path;
+
+// Codecs write these.
+constexpr const char* kVideoSuffixes[] = {".mp4", ".avi", ".mkv"};
+
+std::string lower_suffix(const Path& file) {
+    std::string suffix = file.extension().string();
+    for (char& c : suffix)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return suffix;
+}
+
+std::string kind_of(const ImageView& image) {
+    static const std::map<PixelType, const char*> names = {
+        {PixelType::u8, "uint8"}, {PixelType::u16, "uint16"}, {PixelType::f32, "float32"}};
+    return std::string(names.at(image.type)) + (image.channels == 1 ? " gray" : " colour");
+}
 
 class FolderSink : public Sink {
    public:
-    FolderSink(Path folder, Journal* journal) : folder_(std::move(folder)), journal_(journal) {}
+    FolderSink(Path folder, Journal* journal, Codecs& codecs)
+        : folder_(std::move(folder)), journal_(journal), codecs_(codecs) {}
     bool concurrent() const override { return true; }
 
     std::map<std::string, long> begin(const std::vector<FrameName>& frames) override {
@@ -29,20 +47,19 @@ class FolderSink : public Sink {
     }
 
     void write(int, const FrameName& frame, const Registered& pictures) override {
-        const bool floats = pictures.image.depth() == CV_32F;
-        std::vector<std::pair<std::string, const cv::Mat*>> files = {
-            {frame.name + (floats ? ".tiff" : ".png"), &pictures.image},
-            {"masks/" + frame.name + ".png", &pictures.mask}};
-        if (!pictures.overlay.empty())
-            files.emplace_back("overlays/" + frame.name + ".png", &pictures.overlay);
+        const bool floats = pictures.image.view.type == PixelType::f32;
         std::vector<std::string> names;
-        for (const auto& [name, picture] : files) {
-            write_image(folder_ / name, *picture);
+        const auto put = [&](const std::string& name, const Picture& picture) {
+            codecs_.write_image(folder_ / name, picture);
             names.push_back(name);
-        }
-        if (journal_) journal_->append({{frame.key, valid_pixels(pictures.mask)}}, names);
+        };
+        put(frame.name + (floats ? ".tiff" : ".png"), pictures.image);
+        put("masks/" + frame.name + ".png", pictures.mask);
+        if (!pictures.overlay.empty()) put("overlays/" + frame.name + ".png", pictures.overlay);
+        if (journal_) journal_->append({{frame.key, valid_pixels(pictures.mask.view)}}, names);
     }
 
+    void keep() override {}
     void finish(const std::vector<FrameName>&, const std::function<void()>&) override {}
 
    private:
@@ -62,24 +79,24 @@ class FolderSink : public Sink {
 
     Path folder_;
     Journal* journal_;
+    Codecs& codecs_;
 };
 
 // One video; beside it NAME.masks.mkv, without loss, and NAME.overlay with its suffix.
 //
-// A video cannot be appended to. Frames go to parts of kPart frames in a folder with `.parts`
-// behind the video's name; finish() copies the compressed frames of all parts into the videos, and
-// removes the parts.
+// A video cannot be appended to. Frames go to parts in a folder with `.parts` behind the video's
+// name; finish() copies the compressed frames of all parts into the videos, and removes the parts.
 class VideoSink : public Sink {
    public:
-    VideoSink(Path path, double rate, Journal* journal)
-        : path_(std::move(path)), parts_(path_.string() + ".parts"), rate_(rate),
-          journal_(journal) {
+    VideoSink(Path path, double rate, Journal* journal, Codecs& codecs, int part_frames)
+        : path_(std::move(path)), parts_(path_.string() + ".parts"), rate_(rate), journal_(journal),
+          codecs_(codecs), part_frames_(part_frames) {
         if (journal) units_ = journal->units();
     }
 
     ~VideoSink() override {
         try {
-            close_part();
+            keep();
         } catch (const std::exception&) {
             // Something else has gone wrong before; what is not whole is thrown away.
         }
@@ -103,36 +120,58 @@ class VideoSink : public Sink {
         std::vector<Path> others;
         for (const fs::directory_entry& entry : fs::directory_iterator(parts_, none))
             if (entry.is_regular_file() && is_part(entry.path().filename().string()) &&
-                !ours.count(inside(entry.path())))
+                !ours.count(inside(entry.path().filename().string())))
                 others.push_back(entry.path());
         for (const Path& file : others) fs::remove(file);
         return done;
     }
 
     void write(int index, const FrameName& frame, const Registered& pictures) override {
-        std::vector<std::pair<Path, const cv::Mat*>> targets = {
+        std::vector<std::pair<Path, const Picture*>> targets = {
             {path_, &pictures.image}, {beside(".masks.mkv"), &pictures.mask}};
         if (!pictures.overlay.empty())
             targets.emplace_back(beside(".overlay" + path_.extension().string()),
                                  &pictures.overlay);
-        if (frames_.size() == kPart || index != next_) close_part();
+        if (static_cast<int>(frames_.size()) == part_frames_ || index != next_) keep();
         next_ = index + 1;
         if (open_.empty()) {
-            for (const auto& [target, picture] : targets) check_video_image(target, *picture);
+            for (const auto& [target, image] : targets) check_video_image(target, image->view);
             fs::create_directories(parts_);
             const std::size_t stem = path_.stem().string().size();
-            for (const auto& [target, picture] : targets) {
-                const std::string kind = target.filename().string().substr(stem);
-                open_.push_back(std::make_unique<Encoder>(parts_ / (frame.key + kind), target,
-                                                          *picture, rate_));
+            for (const auto& [target, image] : targets) {
+                const std::string name = frame.key + target.filename().string().substr(stem);
+                open_.push_back({name, codecs_.open_part(parts_ / name, target, *image, rate_)});
             }
         }
-        for (std::size_t i = 0; i < targets.size(); ++i) open_[i]->write(*targets[i].second);
-        frames_.emplace_back(frame.key, valid_pixels(pictures.mask));
+        for (std::size_t i = 0; i < targets.size(); ++i) {
+            const auto& [target, image] = targets[i];
+            const std::string kind = size_text(image->view) + " " + kind_of(image->view);
+            // What is not like the first frame would be misread.
+            const std::string& first = kinds_.emplace(target, kind).first->second;
+            if (kind != first)
+                throw InputError(target.string() + ": a frame is " + kind + ", the first is " +
+                                 first + "; a video holds frames of one kind, a folder any");
+            open_[i].writer->write(*image);
+        }
+        frames_.emplace_back(frame.key, valid_pixels(pictures.mask.view));
+    }
+
+    // The open part is whole now, and noted.
+    void keep() override {
+        // Whatever fails, neither is closed again.
+        auto frames = std::exchange(frames_, {});
+        const auto open = std::exchange(open_, {});
+        if (frames.empty()) return;
+        std::vector<std::string> names;
+        for (const Part& part : open) {
+            part.writer->close(static_cast<int>(frames.size()));
+            names.push_back(inside(part.name));
+        }
+        note(std::move(frames), names);
     }
 
     void finish(const std::vector<FrameName>& frames, const std::function<void()>& check) override {
-        close_part();
+        keep();
         const std::vector<Unit> units = fitting_units(frames);
         if (std::any_of(units.begin(), units.end(), [this](const Unit& u) { return joined(u); }))
             return;
@@ -154,7 +193,7 @@ class VideoSink : public Sink {
             for (const Unit& unit : units)
                 parts.emplace_back(path_.parent_path() / unit.files.at(i).first,
                                    static_cast<int>(unit.frames.size()));
-            join_videos(parts, beside(kind), rate_, check);
+            codecs_.join(parts, beside(kind), rate_, check);
             names.push_back(beside(kind).filename().string());
         }
         note(std::move(all), names);
@@ -163,14 +202,16 @@ class VideoSink : public Sink {
     }
 
    private:
-    // Frames that a run that is killed, not only interrupted, can lose at most.
-    static constexpr std::size_t kPart = 250;
+    struct Part {
+        std::string name;
+        std::unique_ptr<PartWriter> writer;
+    };
 
     Path beside(const std::string& suffix) const {
         return Path(path_).replace_filename(path_.stem().string() + suffix);
     }
-    std::string inside(const Path& part) const {
-        return parts_.filename().string() + "/" + part.filename().string();
+    std::string inside(const std::string& part) const {
+        return parts_.filename().string() + "/" + part;
     }
     bool joined(const Unit& unit) const {
         return std::any_of(unit.files.begin(), unit.files.end(), [this](const auto& file) {
@@ -206,20 +247,6 @@ class VideoSink : public Sink {
         return whole.empty() ? parts : whole;
     }
 
-    // The open part is whole now, and noted.
-    void close_part() {
-        // Whatever fails, neither is closed again.
-        auto frames = std::exchange(frames_, {});
-        const auto open = std::exchange(open_, {});
-        if (frames.empty()) return;
-        std::vector<std::string> names;
-        for (const std::unique_ptr<Encoder>& encoder : open) {
-            encoder->close(static_cast<int>(frames.size()));
-            names.push_back(inside(encoder->path()));
-        }
-        note(std::move(frames), names);
-    }
-
     void note(std::vector<std::pair<std::string, long>> frames,
               const std::vector<std::string>& names) {
         Unit unit{frames, {}};
@@ -232,20 +259,42 @@ class VideoSink : public Sink {
     Path path_, parts_;
     double rate_;
     Journal* journal_;
+    Codecs& codecs_;
+    int part_frames_;
     std::vector<Unit> units_;
-    std::vector<std::unique_ptr<Encoder>> open_;
+    std::vector<Part> open_;
+    std::map<Path, std::string> kinds_;                 // of the images, by the video
     std::vector<std::pair<std::string, long>> frames_;  // of the open part
     int next_ = 0;
 };
 
 }  // namespace
 
-long valid_pixels(const cv::Mat& mask) {
-    return static_cast<long>(mask.total()) - cv::countNonZero(mask);
+long valid_pixels(const ImageView& mask) {
+    long valid = 0;
+    for (int y = 0; y < mask.height; ++y)
+        valid += std::count(mask.row<std::uint8_t>(y), mask.row<std::uint8_t>(y) + mask.width, 0);
+    return valid;
 }
 
 bool is_video_output(const Path& output) {
-    return has_suffix(output, kVideoOutputs) && !fs::is_directory(output);
+    const std::string suffix = lower_suffix(output);
+    return std::find(std::begin(kVideoSuffixes), std::end(kVideoSuffixes), suffix) !=
+               std::end(kVideoSuffixes) &&
+           !fs::is_directory(output);
+}
+
+void check_video_image(const Path& target, const ImageView& image) {
+    const std::string suffix = lower_suffix(target);
+    const bool lossless = suffix == ".mkv";
+    const bool deep = image.type == PixelType::u16 && image.channels == 1 && lossless;
+    if (image.type != PixelType::u8 && !deep)
+        throw InputError(target.string() + ": the images are " + kind_of(image) + "; " + suffix +
+                         " holds uint8" + (lossless ? " and gray uint16" : "") +
+                         ", a folder holds any");
+    if (image.width % 2 || image.height % 2)
+        throw InputError(target.string() + ": the images are " + size_text(image) +
+                         "; a video holds even sizes, a folder any");
 }
 
 Path journal_of(const Path& output) {
@@ -253,9 +302,11 @@ Path journal_of(const Path& output) {
                                    : output / "register.jsonl";
 }
 
-std::unique_ptr<Sink> open_sink(const Path& output, double rate, Journal* journal) {
-    if (is_video_output(output)) return std::make_unique<VideoSink>(output, rate, journal);
-    return std::make_unique<FolderSink>(output, journal);
+std::unique_ptr<Sink> open_sink(const Path& output, double rate, Journal* journal, Codecs& codecs,
+                                int part_frames) {
+    if (is_video_output(output))
+        return std::make_unique<VideoSink>(output, rate, journal, codecs, part_frames);
+    return std::make_unique<FolderSink>(output, journal, codecs);
 }
 
-}  // namespace xcalib::cli
+}  // namespace xcalib

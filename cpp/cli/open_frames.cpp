@@ -1,0 +1,35 @@
+#include "open_frames.hpp"
+
+#include "depth.hpp"
+#include "footage.hpp"
+#include "xcalib/stream/pairs.hpp"
+
+namespace xcalib::cli {
+
+Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& rig,
+                   Console& console) {
+    if (arguments.depth.spec.empty()) throw InputError("Missing option '--depth'.");
+    Pairs pairs(open_stream(arguments.reference), open_stream(arguments.source),
+                {arguments.pairing, arguments.time_offset, arguments.max_gap,
+                 arguments.reference_times, arguments.source_times});
+    arguments.depth.plane.validate();
+    const OpenDepth open = [&](const std::vector<int>& used) {
+        return open_depth(arguments.depth, pairs.reference_list(), used);
+    };
+    if (rig) pairs.refine(*rig, open);
+    const DepthPointer depth = open(pairs.pairing().references);
+    for (const std::string& note : pairs.notes()) console.note(note);
+    if (rig && rig->relative_depth)
+        console.note(
+            "the rig was calibrated with relative depth: metres do not fit its translation");
+    return {pairs.references(), pairs.sources(), depth};
+}
+
+Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& console) {
+    std::string said;
+    frames.sources = scalar_sources(frames.sources, colormap, said);
+    if (!said.empty()) console.note(said);
+    return frames;
+}
+
+}  // namespace xcalib::cli

@@ -1,0 +1,126 @@
+#include "xcalib/stream/pairs.hpp"
+
+#include <set>
+
+#include "xcalib/error.hpp"
+#include "xcalib/stream/interrupts.hpp"
+
+namespace xcalib {
+namespace {
+
+EdgesOfFrame edges_of(Stream& stream) {
+    return [&stream](int index) -> std::optional<Image> {
+        check_interrupts();
+        try {
+            return motion_edges(stream[index].view);
+        } catch (const DecodeError&) {
+            return std::nullopt;
+        }
+    };
+}
+
+void require_times(const Stream& references, const Stream& sources) {
+    if (!references.times || !sources.times)
+        throw InputError("a clock offset needs times of both streams' frames; expected them");
+}
+
+}  // namespace
+
+OffsetEstimate estimate_offset(Stream& references, Stream& sources, double max_offset,
+                               int max_frames) {
+    require_times(references, sources);
+    return estimate_offset(*references.times, *sources.times, edges_of(references),
+                           edges_of(sources), max_offset, max_frames);
+}
+
+std::vector<double> offsets_around(double guess, const Stream& references, const Stream& sources) {
+    require_times(references, sources);
+    return offsets_around(guess, *references.times, *sources.times);
+}
+
+RefinedOffset refine_offset(const Rig& rig, Stream& references, Stream& sources, Depth& depth,
+                            const std::vector<double>& candidates, int max_frames) {
+    require_times(references, sources);
+    RegisteredNec judge(rig);
+    int last = -1;  // candidates pair one reference with many sources
+    Picture reference, metres;
+    const auto score = [&](int index, int other) -> std::optional<double> {
+        check_interrupts();
+        try {
+            if (index != last) {
+                last = -1;
+                reference = references[index];
+                metres = depth(index, reference);
+                last = index;
+            }
+            return judge(reference.view, sources[other].view, metres.view);
+        } catch (const DecodeError&) {
+            return std::nullopt;
+        }
+    };
+    return refine_offset(*references.times, *sources.times, candidates, score, max_frames);
+}
+
+Pairs::Pairs(StreamPointer references, StreamPointer sources, const Matching& matching,
+             std::optional<OffsetEstimate> estimate)
+    : all_references_(std::move(references)), all_sources_(std::move(sources)), matching_(matching),
+      estimate_(std::move(estimate)) {
+    if (!matching.reference_times.empty())
+        all_references_->times = read_times(matching.reference_times, *all_references_);
+    if (!matching.source_times.empty())
+        all_sources_->times = read_times(matching.source_times, *all_sources_);
+    reference_list_ = all_references_->frames();
+    source_list_ = all_sources_->frames();
+    if (!matching.time_offset) {
+        if (matching.method != "auto" && matching.method != "time")
+            throw InputError("a clock offset needs frames paired by time; they are by " +
+                             matching.method);
+        if (!estimate_) estimate_ = estimate_offset(*all_references_, *all_sources_);
+        notes_.push_back("clock offset: " + estimate_->line());
+    }
+    const double offset = estimate_ ? estimate_->offset : *matching.time_offset;
+    pairing_ =
+        pair_frames(reference_list_, source_list_, matching.method, offset, matching.max_gap);
+    if (pairing_.method == "time") notes_.push_back("frames: " + pairing_.line());
+}
+
+void Pairs::refine(const Rig& rig, const OpenDepth& open_depth) {
+    if (!estimate_) return;
+    RefinedOffset found = refined(estimate_->peak, rig, open_depth);
+    if (!found.told && estimate_->offset != 0) {
+        // A peak elsewhere may be as high, and most clocks are meant to agree.
+        RefinedOffset again = refined(0.0, rig, open_depth);
+        if (again.told) found = std::move(again);
+    }
+    notes_.resize(estimate_->trusted || !found.told ? 1 : 0);
+    notes_.push_back("clock offset: " + found.line());
+    if (found.told)
+        pairing_ =
+            pair_frames(reference_list_, source_list_, "time", found.offset, matching_.max_gap);
+    notes_.push_back("frames: " + pairing_.line());
+}
+
+RefinedOffset Pairs::refined(double guess, const Rig& rig, const OpenDepth& open_depth) const {
+    const std::vector<double> candidates = offsets_around(guess, *all_references_, *all_sources_);
+    std::vector<int> used = pairing_.references;
+    DepthPointer depth;
+    if (all_references_->size() > all_sources_->size()) {
+        // The neighbours of a paired reference tell too, if there is depth of them.
+        try {
+            std::set<int> every;
+            for (const double offset : candidates)
+                for (const int index :
+                     pair_frames(reference_list_, source_list_, "time", offset).references)
+                    every.insert(index);
+            const std::vector<int> wide(every.begin(), every.end());
+            depth = open_depth(wide);
+            used = wide;
+        } catch (const InputError&) {
+        }
+    }
+    if (!depth) depth = open_depth(used);
+    const StreamPointer references = picked(all_references_, used);
+    return refine_offset(rig, *references, *all_sources_, *depth, candidates);
+}
+
+}  // namespace xcalib
