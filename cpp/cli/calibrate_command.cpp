@@ -22,7 +22,7 @@ namespace {
 struct Arguments {
     FrameArguments frames;
     std::string output, choose = "informed", colormap = "auto", initial, search = "auto",
-                        flow = "auto", solver = "ceres", report;
+                        mount = "auto", flow = "auto", solver = "ceres", report;
     std::optional<std::string> reference_intrinsics, source_intrinsics;
     bool explain = false, refine_plane = false;
     CalibrationOptions options;
@@ -149,6 +149,7 @@ void run(Arguments a, Console& console) {
     check(a);
     CalibrationOptions& options = a.options;
     options.search.mode = value_of<SearchMode>("--search", a.search);
+    options.mount = Mount::parse("--mount", a.mount);
     options.flow = value_of("--flow", a.flow, flow_arguments());
     options.solver = value_of<Solver>("--solver", a.solver);
     std::optional<Pinhole> reference_camera, source_camera;
@@ -254,6 +255,24 @@ void add_calibrate(CLI::App& app, Console& console) {
                      " or auto.")
         ->type_name("HOW")
         ->check(CLI::IsMember(names_of(words<SearchMode>())))
+        ->capture_default_str();
+    command
+        ->add_option(
+            "--mount", a.mount,
+            "How the source image is turned, in degrees clockwise (90, 180, 270, ...), and"
+            " whether it is then mirrored; auto: upright, and where that is not found any.")
+        ->type_name("auto|upright|DEG|mirrored[-DEG]")
+        ->capture_default_str();
+    command
+        ->add_option("--max-roll", a.options.search.max_roll_deg,
+                     "Roll about the mount that is searched.")
+        ->type_name("DEG")
+        ->capture_default_str();
+    command
+        ->add_option("--max-fov-ratio", a.options.search.max_fov_ratio,
+                     "Largest ratio of the two fields of view that is searched, either way, in"
+                     " tangents.")
+        ->type_name("R")
         ->capture_default_str();
     command
         ->add_option("--flow", a.flow,

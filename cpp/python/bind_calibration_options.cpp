@@ -6,6 +6,7 @@
 #include "options.hpp"
 #include "xcalib/calibration_options.hpp"
 #include "xcalib/footage/pairing.hpp"
+#include "xcalib/mount.hpp"
 
 namespace xcalib {
 namespace {
@@ -113,7 +114,15 @@ void bind_calibration_options(py::module_& m) {
                        "gamma of Eq. (total_loss), in stage 1; >= 0.");
     bind_flow_term(options);
     bind_cameras(options);
-    options.def_readwrite("search", &CalibrationOptions::search, "SearchOptions.");
+    options
+        .def_property(
+            "mount", [](const CalibrationOptions& o) { return Mount::word(o.mount); },
+            [](CalibrationOptions& o, const std::string& word) {
+                o.mount = Mount::parse("mount", word);
+            },
+            "How the source image is turned: 'auto' (upright, and where that is not found any), "
+            "'upright', degrees clockwise as '90', 'mirrored', or both as 'mirrored-90'.")
+        .def_readwrite("search", &CalibrationOptions::search, "SearchOptions.");
     def_word(options, "solver", &CalibrationOptions::solver, "solver",
              "'ceres', or 'adam' as published, which searches nothing.");
     options.def_readwrite("adam", &CalibrationOptions::adam, "AdamOptions.")

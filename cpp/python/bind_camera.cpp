@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "bindings.hpp"
+#include "xcalib/mount.hpp"
 #include "xcalib/rig_file.hpp"
 
 namespace xcalib {
@@ -112,13 +113,16 @@ void bind_rig_pose(py::class_<Rig>& rig) {
     rig.def_property(
            "R", &Rig::R,
            [](Rig& rig, const Eigen::Matrix3d& R) {
-               rig = make_rig(rig.reference, rig.source, py::cast(R), py::cast(rig.t()));
+               rig.source_from_reference.rotation =
+                   make_rig(rig.reference, rig.source, py::cast(R), py::none())
+                       .source_from_reference.rotation;
            },
            "(3, 3) float64 rotation, source_from_reference.")
         .def_property(
             "t", [](const Rig& rig) { return rig.t(); },
             [](Rig& rig, const Eigen::Vector3d& t) {
-                rig = make_rig(rig.reference, rig.source, py::cast(rig.R()), py::cast(t));
+                rig.source_from_reference.translation =
+                    make_rig(rig.reference, rig.source, py::none(), py::cast(t)).t();
             },
             "(3,) float64 translation, source_from_reference [m].")
         .def_property_readonly(
@@ -156,7 +160,13 @@ void bind_rig(py::module_& m) {
         .def_readwrite("reference", &Rig::reference, "Pinhole that gives the pixel grid.")
         .def_readwrite("source", &Rig::source, "Pinhole whose images are registered.")
         .def_readwrite("relative_depth", &Rig::relative_depth,
-                       "RelativeDepth it was calibrated with, or None: metric depth.");
+                       "RelativeDepth it was calibrated with, or None: metric depth.")
+        .def_readwrite("source_mirrored", &Rig::source_mirrored,
+                       "Whether the source image is a mirror image: u = cx - fx X/Z + skew Y/Z.")
+        .def_property_readonly(
+            "mount", [](const Rig& rig) { return Mount::of(rig).text(); },
+            "How the source image is turned against the reference's, in words: 'upright' up to 15 "
+            "deg of roll, 'upside down', 'turned by 90 deg clockwise', 'mirrored', ...");
     bind_rig_pose(rig);
     bind_rig_files(rig);
     rig.def("resized", &Rig::resized, py::arg("reference_width"), py::arg("reference_height"),

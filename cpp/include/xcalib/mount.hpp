@@ -23,6 +23,9 @@ struct Mount {
     // InputError, naming `option`, where it is none of these.
     static std::optional<Mount> parse(const std::string& option, const std::string& word);
 
+    // What parse() takes for it.
+    static std::string word(const std::optional<Mount>& mount);
+
     // "upright" up to 15 deg of roll, "upside down", "turned by 90 deg clockwise", "mirrored", ...
     std::string text() const;
 };

@@ -32,6 +32,7 @@ std::string fingerprint(const Rig& rig) {
     const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
     for (const double value : {q.w(), q.x(), q.y(), q.z()}) add(value);
     for (const double value : rig.t()) add(value);
+    if (rig.source_mirrored) add(1);
     if (rig.relative_depth) {
         add(rig.relative_depth->scale);
         add(rig.relative_depth->shift);

@@ -37,6 +37,13 @@ std::optional<Mount> Mount::parse(const std::string& option, const std::string& 
     return mount;
 }
 
+std::string Mount::word(const std::optional<Mount>& mount) {
+    if (!mount) return "auto";
+    const std::string angle = mount->roll_deg == 0 ? "" : format("%g", mount->roll_deg);
+    if (!mount->mirrored) return angle.empty() ? "upright" : angle;
+    return angle.empty() ? "mirrored" : "mirrored-" + angle;
+}
+
 std::string Mount::text() const {
     const double roll = std::remainder(roll_deg, 360.0);
     if (std::abs(roll) <= kUpright) return mirrored ? "mirrored" : "upright";

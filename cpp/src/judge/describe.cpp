@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/format.hpp"
+#include "xcalib/mount.hpp"
 
 namespace xcalib {
 namespace {
@@ -57,6 +58,8 @@ std::string facts_text(const Rig& rig) {
     std::string text = camera_text("reference", rig.reference) + camera_text("source", rig.source);
     text += format("rotation   pan %+.3f (right), tilt %+.3f (up), roll %+.3f (clockwise) deg\n",
                    facts.pan_deg, facts.tilt_deg, facts.roll_deg);
+    const std::string mount = Mount::of(rig).text();
+    if (mount != "upright") text += "mount      the source image is " + mount + "\n";
     text += "t          " + vector_text(rig.t()) + " m (source_from_reference)\n";
     text +=
         "position   " + vector_text(facts.position) + " m of the source: right, down, forward\n";

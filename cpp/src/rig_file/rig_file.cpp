@@ -128,9 +128,10 @@ void write_camera(std::ostream& out, const char* name, const Pinhole& camera) {
 Rig parse_rig(const std::string& path, const YAML::Node& root) {
     const Section file(path, "the file", root,
                        {"format", "version", "reference", "source", "source_from_reference"},
-                       {"relative_depth"});
+                       {"relative_depth", "source_mirrored"});
     if (file.text("format") != "xcalib-rig") file.fail("format", file.text("format"), "xcalib-rig");
-    if (file.text("version") != "1") file.fail("version", file.text("version"), "1");
+    if (file.text("version") != "1" && file.text("version") != "2")
+        file.fail("version", file.text("version"), "1 or 2");
     const Section pose(path, "source_from_reference", file.node("source_from_reference"),
                        {"quaternion_wxyz", "translation_m"});
     const std::vector<double> q = pose.numbers("quaternion_wxyz", 4);
@@ -143,6 +144,11 @@ Rig parse_rig(const std::string& path, const YAML::Node& root) {
     if (const YAML::Node node = file.node("relative_depth")) {
         const Section relative(path, "relative_depth", node, {"scale", "shift"});
         rig.relative_depth = RelativeDepth{relative.number("scale"), relative.number("shift")};
+    }
+    if (file.node("source_mirrored")) {
+        const std::string word = file.text("source_mirrored");
+        if (word != "true" && word != "false") file.fail("source_mirrored", word, "true or false");
+        rig.source_mirrored = word == "true";
     }
     try {
         rig.validate();
@@ -174,7 +180,8 @@ void save_rig(const Rig& rig, const std::string& path) {
     const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
     std::ostringstream out;
     out.imbue(std::locale::classic());
-    out << "format: xcalib-rig\nversion: 1\n";
+    // Software from before version 2 reads what needs nothing of it.
+    out << "format: xcalib-rig\nversion: " << (rig.source_mirrored ? 2 : 1) << "\n";
     write_camera(out, "reference", rig.reference);
     write_camera(out, "source", rig.source);
     out << "source_from_reference:\n"
@@ -182,6 +189,7 @@ void save_rig(const Rig& rig, const std::string& path) {
         << text_of(q.y()) << ", " << text_of(q.z()) << "]\n"
         << "  translation_m: [" << text_of(rig.t().x()) << ", " << text_of(rig.t().y()) << ", "
         << text_of(rig.t().z()) << "]\n";
+    if (rig.source_mirrored) out << "source_mirrored: true\n";
     if (rig.relative_depth)  // inverse depth = scale r + shift
         out << "relative_depth:\n"
             << "  scale: " << text_of(rig.relative_depth->scale) << "\n"

@@ -111,6 +111,30 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     help="Global search before refinement: full, local (around the initial rig), off, or auto.",
 )
 @click.option(
+    "--mount",
+    metavar="auto|upright|DEG|mirrored[-DEG]",
+    default=DEFAULTS.mount,
+    show_default=True,
+    help="How the source image is turned, in degrees clockwise (90, 180, 270, ...), and whether it"
+    " is then mirrored; auto: upright, and where that is not found any.",
+)
+@click.option(
+    "--max-roll",
+    metavar="DEG",
+    type=click.FloatRange(0, 180),
+    default=DEFAULTS.search.max_roll_deg,
+    show_default=True,
+    help="Roll about the mount that is searched.",
+)
+@click.option(
+    "--max-fov-ratio",
+    metavar="R",
+    type=click.FloatRange(1, 10, min_open=True),
+    default=DEFAULTS.search.max_fov_ratio,
+    show_default=True,
+    help="Largest ratio of the two fields of view that is searched, either way, in tangents.",
+)
+@click.option(
     "--flow",
     "flow_spec",
     metavar="auto|off|patch|MODEL.onnx",
@@ -184,6 +208,9 @@ def command(
     threads: int,
     initial: Path | None,
     search: str,
+    mount: str,
+    max_roll: float,
+    max_fov_ratio: float,
     flow_spec: str,
     solver: str,
     reference_intrinsics: tuple[float, float, float, float] | None,
@@ -226,6 +253,9 @@ def command(
         optimize_reference=optimize_reference,
     )
     calibration.search.mode = search
+    calibration.search.max_roll_deg = max_roll
+    calibration.search.max_fov_ratio = max_fov_ratio
+    calibration.mount = mount
     calibration.solver = solver
     calibration.validate()
     calibration.flow, flow = flow_of(flow_spec)
