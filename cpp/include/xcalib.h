@@ -44,6 +44,7 @@ typedef struct xcalib_rig {
     /* Of rigs calibrated on relative inverse depth r: metres are 1 / (scale r + shift), which is
      * the caller's to compute. 0 and 0 where depth is metric. */
     double relative_depth_scale, relative_depth_shift;
+    int source_mirrored; /* not 0: the source image is a mirror image */
 } xcalib_rig;
 
 /* Reference pixels that the source camera sees something nearer in front of. */

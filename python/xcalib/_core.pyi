@@ -92,6 +92,8 @@ class Rig:
     """(3,) float64 translation, source_from_reference [m]."""
     relative_depth: RelativeDepth | None
     """RelativeDepth it was calibrated with, or None: metric depth."""
+    source_mirrored: bool
+    """Whether the source image is a mirror image: u = cx - fx X/Z + skew Y/Z."""
 
     def __init__(
         self,
@@ -104,6 +106,11 @@ class Rig:
     @property
     def quaternion_wxyz(self) -> NDArray[float64]:
         """(4,) float64 unit quaternion of R."""
+    @property
+    def mount(self) -> str:
+        """How the source image is turned against the reference's, in words: 'upright' up to 15 deg
+        of roll, 'upside down', 'turned by 90 deg clockwise', 'mirrored', ...
+        """
     @property
     def infinite_homography(self) -> NDArray[float64]:
         """(3, 3) float64, K_S R K_R^-1: where points at infinity go."""
@@ -197,6 +204,10 @@ class CalibrationOptions:
     relative_depth: RelativeDepth | None
     """RelativeDepth that the depth maps were made with: the shift is estimated, the scale kept,
     and the rig has both. None: metric depth.
+    """
+    mount: str
+    """How the source image is turned: 'auto' (upright, and where that is not found any), 'upright',
+    degrees clockwise as '90', 'mirrored', or both as 'mirrored-90'.
     """
     search: SearchOptions
     """SearchOptions."""

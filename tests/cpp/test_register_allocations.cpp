@@ -59,7 +59,7 @@ TEST(Registrar, AllocatesNothingForAFrame) {
 
 TEST(CApi, AllocatesNothingForAFrame) {
     const xcalib_camera camera{321, 240, 300, 300, 160, 119.5, 0};
-    const xcalib_rig rig{camera, camera, {1, 0, 0, 0}, {-0.3, 0.01, 0.02}, 0, 0};
+    const xcalib_rig rig{camera, camera, {1, 0, 0, 0}, {-0.3, 0.01, 0.02}, 0, 0, 0};
     xcalib_registrar* registrar = nullptr;
     ASSERT_EQ(xcalib_create(&rig, nullptr, &registrar), XCALIB_OK);
     std::vector<float> pixels(321 * 240, 8.0f), out(321 * 240), map(2 * 321 * 240);

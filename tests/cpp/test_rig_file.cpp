@@ -169,8 +169,8 @@ TEST_F(RigFile, ImpossibleValuesAreNamed) {
 }
 
 TEST_F(RigFile, AnotherVersionOrFormatIsNamed) {
-    const std::string message = refusal_with("version: 1", "version: 2");
-    EXPECT_TRUE(has(message, "version = 2, expected 1"));
+    const std::string message = refusal_with("version: 1", "version: 3");
+    EXPECT_TRUE(has(message, "version = 3, expected 1 or 2"));
     EXPECT_TRUE(has(refusal_with("xcalib-rig", "kalibr"), "kalibr"));
 }
 
@@ -265,6 +265,19 @@ TEST_F(RigFile, RelativeDepthIsKeptWhereThereIsOne) {
     EXPECT_TRUE(has(message, "relative_depth: scale = 0, expected a finite number > 0")) << message;
     write_with("format", "relative_depth: {scale: 1}\nformat");
     EXPECT_TRUE(has(refusal([&] { load_rig(path_); }), "missing field 'shift' in relative_depth"));
+}
+
+TEST_F(RigFile, AMirroredSourceIsKeptInVersion2) {
+    write_with("version: 1", "version: 2\nsource_mirrored: true");
+    const Rig rig = load_rig(path_);
+    EXPECT_TRUE(rig.source_mirrored);
+    save_rig(rig, path_);
+    EXPECT_TRUE(load_rig(path_).source_mirrored);
+    xcalib_rig in_c{};
+    ASSERT_EQ(xcalib_load_rig(path_.c_str(), &in_c), XCALIB_OK);
+    EXPECT_EQ(in_c.source_mirrored, 1);
+    EXPECT_TRUE(has(refusal_with("version: 1", "version: 2\nsource_mirrored: perhaps"),
+                    "source_mirrored = perhaps, expected true or false"));
 }
 
 TEST_F(RigFile, ReadsTheSameInC) {

@@ -53,7 +53,9 @@ Rig rig_of(const xcalib_rig& rig) {
     const double* t = rig.translation_m;
     return {camera_of(rig.reference),
             camera_of(rig.source),
-            {Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d(t[0], t[1], t[2])}};
+            {Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d(t[0], t[1], t[2])},
+            std::nullopt,
+            rig.source_mirrored != 0};
 }
 
 RegistrarOptions options_of(const xcalib_options& options) {

@@ -22,7 +22,8 @@ xcalib_status xcalib_load_rig(const char* path, xcalib_rig* rig) try {
             {q.w(), q.x(), q.y(), q.z()},
             {read.t().x(), read.t().y(), read.t().z()},
             relative.scale,
-            relative.shift};
+            relative.shift,
+            read.source_mirrored};
     return XCALIB_OK;
 } catch (...) {
     return xcalib::status_of_exception();
