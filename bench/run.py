@@ -8,7 +8,7 @@ run.py --list              their names, and what each measures
 run.py --docs              then writes the tables of docs/performance.md and its picture
 run.py --docs-only         writes them from what is kept
 
-Of each benchmark the newest run is kept, with its commit, its date and the machine; a run that
+The newest run of each benchmark is kept, with its commit, its date and the machine; a run that
 fails, or that skips everything, replaces nothing.
 """
 

@@ -699,7 +699,7 @@ def test_offset_is_refined_by_registration(rendered: Path) -> None:
     visible.times, thermal.times = np.arange(FRAMES) * 0.5, np.arange(FRAMES) * 0.5 + 0.5
     provider = FolderDepth(rendered / "depth", list_files(rendered / "visible"))
     found = refine_offset(rig, visible, thermal, provider, [0, 0.5, 1.0], 3)
-    assert found.told and found.offset == 0.5
+    assert found.decided and found.offset == 0.5
     assert found.scores[1] > max(found.scores[0], found.scores[2])
     # The guess, in the middle, is a frame off.
     assert refine_offset(rig, visible, thermal, provider, [0, 0.5, 1.0, 1.5], 3).offset == 0.5
@@ -848,7 +848,7 @@ def test_a_rig_that_stands_still_tells_no_offset_by_registration() -> None:
     visible, thermal = pans(0.15, moves=False)
     candidates = offsets_around(0.1, visible, thermal)
     found = refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates)
-    assert not found.told and found.offset == pytest.approx(0.1)
+    assert not found.decided and found.offset == pytest.approx(0.1)
     assert "change too little to confirm" in found.line()
 
 
@@ -889,7 +889,7 @@ def test_frames_that_cannot_be_decoded_do_not_hinder_the_offset() -> None:
     thermal.read = read  # type: ignore[method-assign]
     assert estimate_offset(visible, thermal).offset == pytest.approx(0.2, abs=0.008)
     candidates = offsets_around(0.2, visible, thermal)
-    assert refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates, 40).told
+    assert refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates, 40).decided
 
 
 def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> None:

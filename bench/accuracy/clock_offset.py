@@ -104,7 +104,7 @@ def main():
                 alone.append((estimate.trusted, estimate.peak - late))
                 candidates = offsets_around(estimate.peak, visible, thermal)
                 found = refine_offset(rig, visible, thermal, Maps(depths), candidates)
-                refined.append((found.told, found.offset - late))
+                refined.append((found.decided, found.offset - late))
             speed = "varying" if varies else "steady"
             label = f"{RATE} and {rate} frames/s, {speed} speed"
             report(f"{label}, footage alone", alone)

@@ -196,7 +196,7 @@ def frames(results: Results) -> None:
         "frames",
         found,
         f"Rendered rigs of 320x240, {rigs} in each cell, displaced by 0.1 of the width, ratio of"
-        " fields of view 0.8-1.25; the search looks for rolls within 5 deg unless told otherwise."
+        " fields of view 0.8-1.25; the search looks for rolls within 5 deg unless asked otherwise."
         f" Found: median end-point error under {LIMIT:g} px, of a rig over all 8 frames.",
     )
 

@@ -129,7 +129,7 @@ void check(const Arguments& a) {
             "--reference-intrinsics are kept; expected no --reference-hfov or --optimize-reference"
             " with them");
     if (a.explain && a.choose != "informed")
-        throw InputError("--explain tells of --choose informed, expected that too");
+        throw InputError("--explain goes with --choose informed, expected that too");
     if (a.refine_plane && a.frames.depth.spec != "plane")
         throw InputError("--refine-plane goes with --depth plane, not " + a.frames.depth.spec);
     for (const auto& [asked, flag] : {std::pair(a.frames.depth.complete, "--complete"),

@@ -8,7 +8,7 @@
 //     bytes  8-11   uint32  height [px], 1 to 16384
 //     bytes 12-15   uint32  type of the pixels: 1 uint16, 2 float32
 //     bytes 16-23   float64 metres per unit of a pixel, > 0 (1 for float32 in metres)
-//     bytes 24-31   uint64  time stamp [us] on any clock, told in the `frame` event
+//     bytes 24-31   uint64  time stamp [us] on any clock, repeated in the `frame` event
 //
 // Depth is along the optical axis of the reference camera, registered to its pixels; 0, negative,
 // NaN and inf are unknown. The aspect is that of the reference image, the size is free.

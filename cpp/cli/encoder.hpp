@@ -1,6 +1,6 @@
 // Videos written through FFmpeg's libraries: encoded, checked, and joined without decoding.
 //
-// OpenCV writes videos too, but tells of no error (a full disk leaves half a video behind), cannot
+// OpenCV writes videos too, but reports no error (a full disk leaves half a video behind), cannot
 // copy compressed frames from one file to another, and before 4.8 knows no gray of 16 bits.
 #pragma once
 

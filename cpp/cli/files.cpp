@@ -61,7 +61,7 @@ void check_folder_writable(const Path& folder) {
         base = base.parent_path();
     const std::string cannot = "cannot write to " + folder.string() + ": " + base.string();
     if (!fs::is_directory(base)) throw InputError(cannot + " is a file, expected a folder");
-    // Only an attempt tells: access rights say nothing of read-only and special file systems.
+    // Only an attempt shows it: access rights say nothing of read-only and special file systems.
     std::string name = (base / ".xcalib-XXXXXX").string();
     const int file = mkstemp(name.data());
     if (file < 0) throw InputError(cannot + ": " + std::strerror(errno));

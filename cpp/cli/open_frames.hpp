@@ -8,11 +8,11 @@
 
 namespace xcalib::cli {
 
-// Paired; how, where that was by time, is told on the console.
+// Paired; the console says how, where that was by time.
 Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& rig,
                    Console& console);
 
-// The frames with false colour turned back to numbers, told on the console.
+// The frames with false colour turned back to numbers, as the console says.
 Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& console);
 
 }  // namespace xcalib::cli

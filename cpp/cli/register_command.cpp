@@ -85,7 +85,7 @@ void add_register(CLI::App& app, Console& console) {
                       "  [default: bilinear]");
     command
         ->add_option("--occlusion", a.occlusion,
-                     "What the source sees something nearer in front of: told by the mask (mark),"
+                     "What the source sees something nearer in front of: marked in the mask (mark),"
                      " or black as well (hide).")
         ->type_name("HOW")
         ->check(CLI::IsMember(names_of(words<Occlusion>())))

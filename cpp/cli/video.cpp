@@ -96,7 +96,7 @@ class Video : public Stream {
     // Goes to before a frame; false where the file does not lead there.
     bool seek(int index) {
         if (!times || index == 0) return false;
-        // To the frame before it: the time of what is grabbed there tells where we are.
+        // To the frame before it: the time of the frame grabbed there shows where we are.
         capture_.set(cv::CAP_PROP_POS_FRAMES, index - 1);
         if (!capture_.grab()) return false;
         const double time = capture_.get(cv::CAP_PROP_POS_MSEC) / 1e3;

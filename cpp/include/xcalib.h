@@ -50,7 +50,7 @@ typedef struct xcalib_rig {
 /* Reference pixels that the source camera sees something nearer in front of. */
 typedef enum xcalib_occlusion {
     XCALIB_OCCLUSION_IGNORE = 0, /* are not looked for */
-    XCALIB_OCCLUSION_MARK = 1,   /* are told by the mask; the image shows what is in front */
+    XCALIB_OCCLUSION_MARK = 1,   /* the mask marks them; the image shows what is in front */
     XCALIB_OCCLUSION_HIDE = 2    /* are 0 in the image too, and NaN in the map */
 } xcalib_occlusion;
 

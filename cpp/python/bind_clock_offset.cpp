@@ -31,7 +31,7 @@ void bind_clock_offset(py::module_& m) {
         .def_readonly("offset", &RefinedOffset::offset,
                       "By how much the source's clock is late [s]; the middle candidate where "
                       "it is not known.")
-        .def_readonly("told", &RefinedOffset::told,
+        .def_readonly("decided", &RefinedOffset::decided,
                       "Whether the frames register worse at both ends of the candidates.")
         .def_readonly("scores", &RefinedOffset::scores,
                       "Mean NEC of the frames judged, at each candidate; empty if fewer than two "

@@ -11,13 +11,13 @@ void bind_frames(py::module_& m) {
     m.def(
         "load_frames",
         [](StreamPointer references, StreamPointer sources, py::object depth,
-           const std::vector<int>& chosen, const std::function<void(int)>& told) {
+           const std::vector<int>& chosen, const std::function<void(int)>& progress) {
             const Frames frames{std::move(references), std::move(sources),
                                 std::make_shared<PythonDepth>(std::move(depth))};
             LoadedFrames loaded;
             {
                 const py::gil_scoped_release unlocked;
-                loaded = load_frames(frames, chosen, told);
+                loaded = load_frames(frames, chosen, progress);
             }
             py::list images[3];
             for (const Frame& frame : loaded.frames) {
@@ -30,11 +30,11 @@ void bind_frames(py::module_& m) {
                 loaded.failures ? left_out(loaded.failures, loaded.first_failure) : "");
         },
         py::arg("references"), py::arg("sources"), py::arg("depth"), py::arg("chosen"),
-        py::arg("told"),
+        py::arg("progress"),
         R"((indices, references, sources, depths, line) of the chosen frames, in memory.
 
 Those that cannot be decoded are left out, and line says how many, or is ''; if none is left, raises
-DecodeError of the first. told(done) is called after each.)");
+DecodeError of the first. progress(done) is called after each.)");
     m.def("left_out", &left_out, py::arg("count"), py::arg("first"),
           "The warning that frames were left out of a calibration, and why the first was.");
     m.def("with_file_name", &with_file_name, py::arg("message"), py::arg("images"),

@@ -95,7 +95,7 @@ void bind_register_frames(py::module_& m) {
         [](StreamPointer references, StreamPointer sources, py::object depth,
            const Registrar& registrar, const Path& output, bool overlays, bool overwrite,
            int part_frames, const MadeWith& inputs, py::object codecs,
-           const std::function<void(const Registration&)>& told, bool hold_interrupts) {
+           const std::function<void(const Registration&)>& progress, bool hold_interrupts) {
             const Frames frames{std::move(references), std::move(sources),
                                 std::make_shared<PythonDepth>(std::move(depth))};
             PythonCodecs compress(std::move(codecs));
@@ -104,22 +104,23 @@ void bind_register_frames(py::module_& m) {
             if (hold_interrupts) held.emplace();
             return register_frames(frames, registrar.rig(), output,
                                    {registrar.options(), overlays, overwrite, part_frames},
-                                   "xcalib", inputs, compress, [&told](const Registration& now) {
+                                   "xcalib", inputs, compress,
+                                   [&progress](const Registration& now) {
                                        const py::gil_scoped_acquire locked;
                                        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-                                       told(now);
+                                       progress(now);
                                    });
         },
         py::arg("references"), py::arg("sources"), py::arg("depth"), py::arg("registrar"),
         py::arg("output"), py::arg("overlays"), py::arg("overwrite"), py::arg("part_frames"),
-        py::arg("inputs"), py::arg("codecs"), py::arg("told"), py::arg("hold_interrupts"),
+        py::arg("inputs"), py::arg("codecs"), py::arg("progress"), py::arg("hold_interrupts"),
         R"(Registers all frames that an earlier run has not written, and returns the Registration.
 
 registrar: with a rig and options to register by; its threads are those of the whole run. part_frames:
 of a video, that a run that is killed can lose at most. inputs: (name, text) of all that the frames
 were opened with; an output of others is refused. codecs: has write_image(file, image),
 encoder_name(), Encoder(part, target, first, rate) and join(parts, target, rate, check).
-told(registration) is called in this thread after frames, and a few times a second. hold_interrupts:
+progress(registration) is called in this thread after frames, and a few times a second. hold_interrupts:
 in the main thread, SIGINT and SIGTERM end the run between two frames, by KeyboardInterrupt.)");
 }
 

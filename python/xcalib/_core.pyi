@@ -595,7 +595,7 @@ class RefinedOffset:
         known.
         """
     @property
-    def told(self) -> bool:
+    def decided(self) -> bool:
         """Whether the frames register worse at both ends of the candidates."""
     @property
     def scores(self) -> list[float]:
@@ -1065,12 +1065,12 @@ def load_frames(
     sources: Stream,
     depth: Any,
     chosen: Sequence[int],
-    told: Callable[[int], object],
+    progress: Callable[[int], object],
 ) -> tuple[list[int], list[NDArray[Any]], list[NDArray[Any]], list[NDArray[float32]], str]:
     """(indices, references, sources, depths, line) of the chosen frames, in memory.
 
     Those that cannot be decoded are left out, and line says how many, or is ''; if none is
-    left, raises DecodeError of the first. told(done) is called after each.
+    left, raises DecodeError of the first. progress(done) is called after each.
     """
 
 def left_out(count: int, first: str) -> str:
@@ -1118,7 +1118,7 @@ def register_frames(
     part_frames: int,
     inputs: Sequence[tuple[str, str]],
     codecs: object,
-    told: Callable[[Registration], object],
+    progress: Callable[[Registration], object],
     hold_interrupts: bool,
 ) -> Registration:
     """Registers all frames that an earlier run has not written, and returns the Registration.
@@ -1127,7 +1127,7 @@ def register_frames(
     part_frames: of a video, that a run that is killed can lose at most. inputs: (name, text)
     of all that the frames were opened with; an output of others is refused. codecs: has
     write_image(file, image), encoder_name(), Encoder(part, target, first, rate) and
-    join(parts, target, rate, check). told(registration) is called in this thread after
+    join(parts, target, rate, check). progress(registration) is called in this thread after
     frames, and a few times a second. hold_interrupts: in the main thread, SIGINT and SIGTERM
     end the run between two frames, by KeyboardInterrupt.
     """

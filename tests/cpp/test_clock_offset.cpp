@@ -101,11 +101,11 @@ TEST(ClockOffset, RegistrationChoosesAmongCandidates) {
     EXPECT_EQ(candidates.size(), 49u);
     EXPECT_NEAR(candidates.front(), 0.1 - 0.6, 1e-12);
     const RefinedOffset found = refine_offset(times, times, candidates, score);
-    EXPECT_TRUE(found.told) << found.line();
+    EXPECT_TRUE(found.decided) << found.line();
     EXPECT_NEAR(found.offset, 0.3, 0.051);
     const RefinedOffset flat =
         refine_offset(times, times, candidates, [](int, int) { return std::optional(0.5); });
-    EXPECT_FALSE(flat.told);
+    EXPECT_FALSE(flat.decided);
     EXPECT_DOUBLE_EQ(flat.offset, candidates[24]);
     EXPECT_TRUE(has(flat.line(), "change too little"));
     const RefinedOffset none =

@@ -31,7 +31,7 @@ struct FlowField {
     int width = 0, height = 0;      // of the grid
     int step = 0;                   // [px] of the reference
     std::vector<float> x, y;        // [px]
-    std::vector<float> confidence;  // in [0, 1]; 0 where nothing can be told
+    std::vector<float> confidence;  // in [0, 1]; 0 where it is unknown
 };
 
 // `reference` and `warped`: gray, of one size. `valid`: one byte a pixel, nonzero where the warped

@@ -32,8 +32,8 @@ double nec(const Image& reference, const Image& registered, const std::uint8_t* 
 // edges place a rig better than few strong ones.
 inline constexpr float kEdgeFloor = 0.3f, kEdgeCap = 2.0f;
 
-// Gradient vectors within them, n max(min(g, cap m) - floor m, 0): noise has no say, and no step
-// stands where edges begin to have one.
+// Gradient vectors within them, n max(min(g, cap m) - floor m, 0): noise is ignored, and there is
+// no step where edges begin to count.
 struct EdgeField {
     int width = 0;
     int height = 0;

@@ -226,12 +226,12 @@ RefinedOffset verdict(const std::vector<double>& candidates,
         const double error = std::sqrt(squares / (frames - 1)) / std::sqrt(frames);
         worse.push_back(average > std::max(2 * error, 1e-12));
     }
-    const bool told = worse.front() && worse.back();
+    const bool decided = worse.front() && worse.back();
     std::size_t near = best;
     const auto distance = [middle](std::size_t c) { return c > middle ? c - middle : middle - c; };
     for (std::size_t c = count; c-- > 0;)
         if (!worse[c] && distance(c) <= distance(near)) near = c;
-    return {candidates[told ? near : middle], told, means};
+    return {candidates[decided ? near : middle], decided, means};
 }
 
 }  // namespace
@@ -297,7 +297,7 @@ std::string RefinedOffset::line() const {
     const std::string figures =
         format("NEC up to %.3f, at the ends of the offsets tried %.3f and %.3f",
                *std::max_element(scores.begin(), scores.end()), scores.front(), scores.back());
-    if (told)
+    if (decided)
         return format("frames register best with the source late by %+.4f s (%s)", offset,
                       figures.c_str());
     return "registered frames change too little to confirm or refine it (" + figures + ")";

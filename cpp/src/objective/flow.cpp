@@ -319,9 +319,9 @@ FlowField one_way(const Pyramid& a, const Pyramid& b, const FlowOptions& options
                 field.x[i] = flow_x.at<float>(y, x) + peak.x;
                 field.y[i] = flow_y.at<float>(y, x) + peak.y;
                 // Height, texture in both directions, distinctness; and all that at coarser levels.
-                float told = ramp(peak.height, 0.1f, 0.4f) * ramp(peak.curvature, 0.0f, 0.03f);
-                if (radius > kFine) told *= ramp(peak.margin, 0.0f, 0.1f);
-                field.confidence[i] = std::sqrt(told * sure.at<float>(y, x));
+                float certainty = ramp(peak.height, 0.1f, 0.4f) * ramp(peak.curvature, 0.0f, 0.03f);
+                if (radius > kFine) certainty *= ramp(peak.margin, 0.0f, 0.1f);
+                field.confidence[i] = std::sqrt(certainty * sure.at<float>(y, x));
             }
         if (level == 0) break;
         const cv::Mat weight = grid_mat(field, field.confidence) + 1e-3;

@@ -159,7 +159,7 @@ NecRows nec_rows(const NecFrame& frame, const Rig& rig, const Parameters& parame
     const Eigen::VectorXd unit = v.normalized();
     NecRows out;
     out.residuals.resize(edges + 1);
-    // s r: the sign has no say in J^T J. Reference edges without a partner move with nothing.
+    // s r: the sign drops out of J^T J. Reference edges without a partner move with nothing.
     out.residuals.head(edges) = a / std::sqrt(pass.sums.aa) - unit;
     out.residuals[edges] = std::sqrt(std::max(0.0, pass.sums.aa - a.squaredNorm()) / pass.sums.aa);
     out.jacobian = Eigen::MatrixXd::Zero(edges + 1, count);

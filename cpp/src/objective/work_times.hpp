@@ -32,8 +32,8 @@ struct WorkTimes {
 };
 
 // The clock of one pass over an image pair: what is not spent in `warp` is of the kind that the
-// pass is of. To read it takes a good part of a short row's time: one row of kEvery tells for all.
-// Without `times` nothing is kept.
+// pass is of. Reading the clock takes a good part of a short row's time, so one row of kEvery
+// stands for all. Without `times` nothing is kept.
 class PassClock {
    public:
     PassClock(WorkTimes* times, bool derives)

@@ -21,7 +21,7 @@ std::vector<ImageView> LoadedFrames::views(Picture Frame::*kind) const {
 }
 
 LoadedFrames load_frames(const Frames& frames, const std::vector<int>& chosen,
-                         const std::function<void(int done)>& told) {
+                         const std::function<void(int done)>& progress) {
     LoadedFrames loaded;
     int done = 0;
     for (const int index : chosen) {
@@ -31,7 +31,7 @@ LoadedFrames load_frames(const Frames& frames, const std::vector<int>& chosen,
         } catch (const DecodeError& error) {
             if (loaded.failures++ == 0) loaded.first_failure = error.what();
         }
-        told(++done);
+        progress(++done);
     }
     if (!loaded.frames.empty()) return loaded;
     if (loaded.failures) throw DecodeError(loaded.first_failure);

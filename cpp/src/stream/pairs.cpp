@@ -87,14 +87,14 @@ Pairs::Pairs(StreamPointer references, StreamPointer sources, const Matching& ma
 void Pairs::refine(const Rig& rig, const OpenDepth& open_depth) {
     if (!estimate_) return;
     RefinedOffset found = refined(estimate_->peak, rig, open_depth);
-    if (!found.told && estimate_->offset != 0) {
+    if (!found.decided && estimate_->offset != 0) {
         // A peak elsewhere may be as high, and most clocks are meant to agree.
         RefinedOffset again = refined(0.0, rig, open_depth);
-        if (again.told) found = std::move(again);
+        if (again.decided) found = std::move(again);
     }
-    notes_.resize(estimate_->trusted || !found.told ? 1 : 0);
+    notes_.resize(estimate_->trusted || !found.decided ? 1 : 0);
     notes_.push_back("clock offset: " + found.line());
-    if (found.told)
+    if (found.decided)
         pairing_ =
             pair_frames(reference_list_, source_list_, "time", found.offset, matching_.max_gap);
     notes_.push_back("frames: " + pairing_.line());

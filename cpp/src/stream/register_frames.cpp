@@ -139,7 +139,7 @@ Registration register_frames(const Frames& frames, const Rig& rig,
                              const std::filesystem::path& output,
                              const RegistrationOptions& options, const std::string& command,
                              const MadeWith& inputs, Codecs& codecs,
-                             const std::function<void(const Registration&)>& told) {
+                             const std::function<void(const Registration&)>& progress) {
     const ImageView reference = (*frames.references)[0].view, source = (*frames.sources)[0].view;
     const Rig sized = fitted(rig, reference.width, reference.height, source.width, source.height);
     const std::vector<FrameName> names = frame_names(frames);
@@ -221,7 +221,7 @@ Registration register_frames(const Frames& frames, const Rig& rig,
         run_stages(static_cast<int>(needed.size()), stages, threads,
                    [&](int, const BusyShares& busy) {
                        look(busy);
-                       told(total);
+                       progress(total);
                        check_interrupts();
                    });
     } catch (const Interrupted&) {

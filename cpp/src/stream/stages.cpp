@@ -30,7 +30,7 @@ class Run {
         : stages_(stages), threads_(threads), end_(count), turns_(stages.size()),
           busy_(stages.size()) {}
 
-    void operator()(const std::function<void(int, const BusyShares&)>& told) {
+    void operator()(const std::function<void(int, const BusyShares&)>& progress) {
         std::vector<std::thread> threads;
         try {
             for (int slot = 0; slot < threads_; ++slot)
@@ -40,7 +40,7 @@ class Run {
         }
         std::exception_ptr refusal;
         try {
-            watch(told);
+            watch(progress);
         } catch (...) {
             refusal = std::current_exception();
             const std::lock_guard lock(mutex_);
@@ -101,7 +101,7 @@ class Run {
         return failed_ > frame;
     }
 
-    void watch(const std::function<void(int, const BusyShares&)>& told) {
+    void watch(const std::function<void(int, const BusyShares&)>& progress) {
         const auto over = [this] { return (next_ >= end_ || interrupted()) && working_ == 0; };
         std::unique_lock lock(mutex_);
         for (bool last = false; !last;) {
@@ -111,7 +111,7 @@ class Run {
             const int done = done_;
             const BusyShares busy = shares();
             lock.unlock();
-            told(done, busy);
+            progress(done, busy);
             lock.lock();
         }
     }
@@ -148,8 +148,8 @@ class Run {
 }  // namespace
 
 void run_stages(int count, const std::vector<Stage>& stages, int threads,
-                const std::function<void(int done, const BusyShares& busy)>& told) {
-    Run(count, stages, threads)(told);
+                const std::function<void(int done, const BusyShares& busy)>& progress) {
+    Run(count, stages, threads)(progress);
 }
 
 }  // namespace xcalib

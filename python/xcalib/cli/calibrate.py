@@ -233,7 +233,7 @@ def command(
             " --optimize-reference with them"
         )
     if explain and choose != "informed":
-        raise click.UsageError("--explain tells of --choose informed, expected that too")
+        raise click.UsageError("--explain goes with --choose informed, expected that too")
     if refine_plane and inputs["depth_spec"] != "plane":
         raise click.UsageError(
             f"--refine-plane goes with --depth plane, not {inputs['depth_spec']}"

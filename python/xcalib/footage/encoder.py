@@ -1,6 +1,6 @@
 """What compresses for `register_frames`: images through OpenCV, videos through PyAV.
 
-PyAV is FFmpeg's libraries. OpenCV writes videos too, but tells of no error (a full disk leaves half
+PyAV is FFmpeg's libraries. OpenCV writes videos too, but reports no error (a full disk leaves half
 a video behind), and cannot copy compressed frames from one file to another.
 """
 

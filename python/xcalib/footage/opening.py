@@ -35,7 +35,7 @@ class Matching:
     max_gap: float | None = None
     """Largest distance of a pair in time [s]; None: half the slower stream's period."""
     reference_times: Path | None = None
-    """Table of `read_times`; None: what the stream itself tells."""
+    """Table of `read_times`; None: what the stream itself says."""
     source_times: Path | None = None
 
 

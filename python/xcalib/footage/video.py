@@ -94,7 +94,7 @@ class Video(Stream):
         """Go to before a frame; False where the file does not lead there."""
         if self.times is None or index == 0:
             return False
-        # To the frame before it: the time of what is grabbed there tells where we are.
+        # To the frame before it: the time of the frame grabbed there shows where we are.
         self._capture.set(cv2.CAP_PROP_POS_FRAMES, index - 1)
         if not self._capture.grab():
             return False

@@ -53,7 +53,7 @@ OffsetEstimate estimate_offset(const std::vector<double>& references,
 struct RefinedOffset {
     // By how much the source's clock is late [s]; the middle candidate where it cannot be known.
     double offset = 0.0;
-    bool told = false;           // whether the frames register worse at both ends of the candidates
+    bool decided = false;        // whether the frames register worse at both ends of the candidates
     std::vector<double> scores;  // mean NEC at each candidate; none if fewer than two can be judged
 
     std::string line() const;

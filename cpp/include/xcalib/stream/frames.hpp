@@ -51,10 +51,10 @@ struct LoadedFrames {
     std::vector<ImageView> views(Picture Frame::*kind) const;
 };
 
-// The chosen frames, without those that cannot be decoded; `told` is called after each of either
-// kind, and may throw. Throws DecodeError of the first where there is no other.
+// The chosen frames, without those that cannot be decoded; `progress` is called after each of
+// either kind, and may throw. Throws DecodeError of the first where there is no other.
 LoadedFrames load_frames(const Frames& frames, const std::vector<int>& chosen,
-                         const std::function<void(int done)>& told);
+                         const std::function<void(int done)>& progress);
 
 // The warning that frames were left out of a calibration, and why the first was.
 std::string left_out(std::size_t count, const std::string& first);

@@ -24,7 +24,7 @@ struct Unit {
 };
 
 // All that decides what an output is, apart from the frames themselves: text by name, in the order
-// in which differences are told. `command` names the program: each describes its inputs in its own
+// in which differences are named. `command` names the program: each describes its inputs in its own
 // words, so that one does not go on with what another began.
 using MadeWith = std::vector<std::pair<std::string, std::string>>;
 

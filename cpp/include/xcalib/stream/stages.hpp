@@ -30,13 +30,13 @@ struct Stage {
 using BusyShares = std::vector<std::pair<std::string, double>>;
 
 // Takes `count` frames through the stages, on `threads` threads besides the caller's. That one
-// calls `told` with the number of frames that are through, whenever it has grown and a few times a
-// second; it may throw. An error, there or in a stage, ends all: no other frame is begun, those
-// under way before the one that failed are finished, none after it gets past a stage that takes
-// them in order, no thread is left. Of several errors that of the earliest frame is thrown; that
-// of `told` if no frame failed. On a request to end (interrupts.hpp) no other frame is begun
-// either, and it is for `told` to throw.
+// calls `progress` with the number of frames that are through, whenever it has grown and a few
+// times a second; it may throw. An error, there or in a stage, ends all: no other frame is begun,
+// those under way before the one that failed are finished, none after it gets past a stage that
+// takes them in order, no thread is left. Of several errors that of the earliest frame is thrown;
+// that of `progress` if no frame failed. On a request to end (interrupts.hpp) no other frame is
+// begun either, and it is for `progress` to throw.
 void run_stages(int count, const std::vector<Stage>& stages, int threads,
-                const std::function<void(int done, const BusyShares& busy)>& told);
+                const std::function<void(int done, const BusyShares& busy)>& progress);
 
 }  // namespace xcalib
