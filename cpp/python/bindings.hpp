@@ -3,6 +3,7 @@
 #pragma once
 
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>  // here for all parts: without it a list fails only when it is returned
 
 namespace xcalib {
 
