@@ -185,7 +185,7 @@ def test_a_path_with_a_colon_is_named_whole(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [
-        ("version: 1", "version: 2", "version"),
+        ("version: 1", "version: 3", "version"),
         ("  skew: 0.3", "  squint: 0.3", "squint"),
         ("  fx: 57.6\n", "", "fx"),
         ("  fx: 57.6", "  fx: .inf", "fx"),

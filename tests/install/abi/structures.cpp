@@ -22,7 +22,8 @@ void print_frame() {
     Rig rig;
     rig.reference = Pinhole::from_hfov(kWidth, kHeight, 0.8);
     rig.source = Pinhole::from_hfov(kWidth, kHeight, 0.7);
-    rig.source_from_reference.rotation = Eigen::Quaterniond(0.9998, 0.01, -0.015, 0.008).normalized();
+    rig.source_from_reference.rotation =
+        Eigen::Quaterniond(0.9998, 0.01, -0.015, 0.008).normalized();
     rig.source_from_reference.translation = Eigen::Vector3d(-0.2, 0.05, 0.1);
     std::vector<Registrar> registrars;  // in one row: what is written past one's end is seen
     for (int i = 0; i < 3; ++i) registrars.emplace_back(rig);
@@ -35,8 +36,9 @@ void print_frame() {
     }
     std::vector<std::uint8_t> registered(source.size());
     for (const Registrar& registrar : registrars) {
-        const ImageView depths{depth.data(), kWidth, kHeight, 1, PixelType::f32,
-                               kWidth * static_cast<std::ptrdiff_t>(sizeof(float))};
+        const ImageView depths{depth.data(),   kWidth,
+                               kHeight,        1,
+                               PixelType::f32, kWidth * static_cast<std::ptrdiff_t>(sizeof(float))};
         registrar.map(depths, map.data());
         registrar.register_frame({source.data(), kWidth, kHeight, 1, PixelType::u8, kWidth}, depths,
                                  {registered.data(), kWidth, kHeight, 1, PixelType::u8, kWidth},
