@@ -430,7 +430,7 @@ def test_images_that_are_not_the_rigs(scene: Path, refused: Refused) -> None:
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        (lambda text: text.replace("version: 1", "version: 2"), "version"),
+        (lambda text: text.replace("version: 1", "version: 3"), "version"),
         (lambda text: text.replace("xcalib-rig", "other-rig"), "format"),
         (lambda text: re.sub(r"(\n *)?fx: [^,\n}]+,? ?", "", text, count=1), "fx"),
         (lambda text: text.rstrip() + "\nsurprise: 1\n", "surprise"),
