@@ -17,7 +17,7 @@ from drive import write_drive
 from xcalib import Rig, synthetic
 from xcalib.cli import cli as python_command
 
-# Of tests in the background of a shell SIGINT is ignored, and so of all that they start.
+# A shell lets its background jobs, and all that they start, ignore SIGINT.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -436,8 +436,8 @@ def test_integer_depth_needs_its_unit() -> None:
 
 @pytest.mark.parametrize("t", [(-0.15, 0.01, 0.02), (0.01, 0.15, -0.02)], ids=["right", "above"])
 def test_occlusion_is_what_the_rays_of_a_rendered_street_say(t: tuple[float, ...]) -> None:
-    """A street has many hidden strips thinner than a pixel of its depth map, of which that cannot
-    tell. Where it can, a pixel's neighbours are hidden as well."""
+    """A street has many hidden strips thinner than a pixel of its depth map, which it cannot
+    show. Where it can, a pixel's neighbours are hidden as well."""
     cameras = Pinhole.from_hfov(1280, 960, 50), Pinhole.from_hfov(640, 512, 48)
     street = synthetic.Street(Rig(*cameras, t=t), 3, seed=0)
     _, depth = street.render_view(1, "visible", "reference")
@@ -610,16 +610,16 @@ def lists_of(frames: list[synthetic.Frame]) -> tuple[list[Array], list[Array], l
 
 
 @pytest.fixture(scope="module")
-def told() -> list[tuple[str, float]]:
+def reported() -> list[tuple[str, float]]:
     return []
 
 
 @pytest.fixture(scope="module")
 def result(
-    frames: list[synthetic.Frame], told: list[tuple[str, float]]
+    frames: list[synthetic.Frame], reported: list[tuple[str, float]]
 ) -> xcalib.CalibrationResult:
     return xcalib.calibrate(
-        *lists_of(frames), progress=lambda stage, share: told.append((stage, share))
+        *lists_of(frames), progress=lambda stage, share: reported.append((stage, share))
     )
 
 
@@ -653,13 +653,13 @@ def test_the_report_is_complete(result: xcalib.CalibrationResult) -> None:
 
 
 def test_progress_is_told_in_order(
-    result: xcalib.CalibrationResult, told: list[tuple[str, float]]
+    result: xcalib.CalibrationResult, reported: list[tuple[str, float]]
 ) -> None:
-    assert len(told) >= 5
-    shares = [share for _, share in told]
+    assert len(reported) >= 5
+    shares = [share for _, share in reported]
     assert shares == sorted(shares)
     assert 0 <= shares[0] < 0.2 and shares[-1] == pytest.approx(1)
-    stages = [stage for stage, _ in told]
+    stages = [stage for stage, _ in reported]
     assert sorted(set(stages), key=stages.index) == ["prepare", "search", "refine", "judge"]
 
 
@@ -718,7 +718,7 @@ def test_a_good_initial_rig_is_refined_without_a_search(
 def test_a_wrong_initial_translation_is_not_kept(
     frames: list[synthetic.Frame], truth: Rig, off: tuple[float, float, float]
 ) -> None:
-    """Half a metre off moves the images by more than 10 px: two frames must tell it."""
+    """Half a metre off moves the images by more than 10 px: two frames must show it."""
     start = Rig(truth.reference, truth.source, truth.R, truth.t + off)
     result = xcalib.calibrate(*lists_of(frames[:2]), initial=start)
     errors, before = (

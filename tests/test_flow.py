@@ -42,9 +42,9 @@ def test_patches_find_a_shift_with_its_sign(dtype: type) -> None:
     assert flow.shape == (180, 240, 2) and flow.dtype == np.float32
     assert confidence.shape == (180, 240) and confidence.dtype == np.float32
     assert confidence.min() >= 0 and confidence.max() <= 1
-    told = confidence > 0.5
-    assert told.mean() > 0.6
-    error = np.linalg.norm(flow - SHIFT, axis=-1)[told]
+    known = confidence > 0.5
+    assert known.mean() > 0.6
+    error = np.linalg.norm(flow - SHIFT, axis=-1)[known]
     assert np.median(error) < 0.15
     assert np.mean(error < 0.5) > 0.95
 

@@ -282,8 +282,8 @@ def test_the_result_has_one_row_per_patch_and_its_own_statistics() -> None:
 
 def test_patches_of_unrelated_images_do_not_tell() -> None:
     a, b = texture(24, 300, 400, sigma=2.5), texture(25, 300, 400, sigma=2.5)
-    told = len(metrics.patch_residual(a, b).shifts)
-    assert told < 0.5 * len(metrics.patch_residual(a, a).shifts)
+    known = len(metrics.patch_residual(a, b).shifts)
+    assert known < 0.5 * len(metrics.patch_residual(a, a).shifts)
 
 
 def test_masked_patches_are_left_out() -> None:

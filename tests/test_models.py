@@ -107,7 +107,7 @@ def test_broken_transfer_is_resumed(server: Server, folder: Path, tags: bool) ->
     server.break_after = None
     seen: list[tuple[int, int | None]] = []
     assert fetch(server.url, show=lambda *state: seen.append(state)).read_bytes() == DATA
-    # Without a tag nothing tells whether the file is still the same: it is fetched anew.
+    # Without a tag nothing shows whether the file is still the same: it is fetched anew.
     assert server.asked == [None, "bytes=300000-" if tags else None]
     assert seen[-1] == (len(DATA), len(DATA))
     assert (seen[0][0] > 300_000) or not tags

@@ -375,7 +375,7 @@ def test_frames_whose_files_have_changed(rendered: Path, tmp_path: Path, out: st
     path = list_files(scene / "thermal")[2]
     write_image(path, 255 - read_image(path))
     result = register(scene, tmp_path / out)
-    # Of a video the frames cannot be taken apart again.
+    # A video's frames cannot be taken apart again.
     there = FRAMES - 1 if out == "out" else 0
     assert f"({there} from before)" in result.stdout or not there
     register(scene, tmp_path / f"new{out}")

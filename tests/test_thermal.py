@@ -48,7 +48,7 @@ def test_a_known_map_is_named_and_inverted(values: NDArray[np.uint8], name: str)
     found = recognise([KNOWN[name].curve[values]])
     assert found is not None
     assert found.name == name
-    # Maps repeat colours here and there: as near as 8 bits of colour tell.
+    # Maps repeat colours here and there: as near as 8 bits of colour allow.
     assert np.mean(np.abs(found.invert(KNOWN[name].curve[values]) - values.astype(int)) <= 3) > 0.95
 
 

@@ -71,9 +71,9 @@ def test_calibrate_writes_the_same_rig(
     first, second = both("calibrate", *folders(rendered), *arguments, *more)
     assert (tmp_path / "c.yaml").read_bytes() == (tmp_path / "p.yaml").read_bytes()
     assert first.stderr == second.stderr
-    told, said = (text.splitlines() for text in (first.stdout, second.stdout))
+    one, other = (text.splitlines() for text in (first.stdout, second.stdout))
     if "--explain" in more:
-        assert told[: FRAMES + 1] == said[: FRAMES + 1]
+        assert one[: FRAMES + 1] == other[: FRAMES + 1]
 
 
 def test_calibrate_with_a_plane_that_is_refined(

@@ -99,12 +99,12 @@ def test_an_interrupted_folder_loses_and_repeats_nothing(
         assert code == (-how if how == signal.SIGKILL else 1)
         if how != signal.SIGKILL:
             done = len(whole_lines(journal))
-            told = re.fullmatch(
+            line = re.fullmatch(
                 r"error: interrupted; (\d+) of 120 frames are done, the same command goes on from"
                 r" there\n",
                 errors,
             )
-            assert told and int(told[1]) == done
+            assert line and int(line[1]) == done
             # Every frame that is there is whole, and is noted.
             assert len(after) == (3 if more else 2) * done + 1
     assert stopped

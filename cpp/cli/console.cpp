@@ -52,24 +52,24 @@ void Console::event(const std::string& name, Json fields) {
     put(object.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-void Console::tell(const std::string& label, const std::string& text) {
+void Console::print(const std::string& label, const std::string& text) {
     const std::lock_guard lock(mutex_);
     clear_bar();
     std::cerr << label << one_line(text) << std::endl;
 }
 
 void Console::note(const std::string& text) {
-    tell("", text);
+    print("", text);
     event("note", {{"message", one_line(text)}});
 }
 
 void Console::warn(const std::string& text) {
-    tell("warning: ", text);
+    print("warning: ", text);
     event("warning", {{"message", one_line(text)}});
 }
 
 void Console::error(int code, const std::string& text) {
-    tell(code == kNotTrusted ? "not to be trusted: " : "error: ", text);
+    print(code == kNotTrusted ? "not to be trusted: " : "error: ", text);
     event("end", {{"exit_code", code}, {"message", one_line(text)}});
 }
 

@@ -48,7 +48,7 @@ class Console {
 
     void clear_bar();
     void put(const std::string& text);
-    void tell(const std::string& label, const std::string& text);
+    void print(const std::string& label, const std::string& text);
 };
 
 }  // namespace xcalib::cli

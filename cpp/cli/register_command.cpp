@@ -78,7 +78,8 @@ void add_register(CLI::App& app, Console& console) {
         ->required();
     command->add_flag("--overlay", a.options.overlays, "Also write red-cyan overlays/.");
     command->add_flag("--overwrite", a.options.overwrite,
-                      "Begin anew.  [default: go on where an interrupted run of the same command"
+                      "Start again from the first frame.  [default: go on where an interrupted run "
+                      "of the same command"
                       " ended]");
     command->add_flag("--nearest", a.options.registrar.nearest,
                       "Take the nearest source pixel as it is: radiometric counts are never mixed."

@@ -66,14 +66,14 @@ CalibrationResult calibrated_parts(const Parts& parts, const py::sequence& refer
     const HeldList d = list_of("depth", depths, [](const std::string& name, const py::object& map) {
         return depth_of(name, map);
     });
-    const Progress tell = [&progress](const std::string& stage, double share) {
+    const Progress notify = [&progress](const std::string& stage, double share) {
         const py::gil_scoped_acquire gil;
         if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
         if (!progress.is_none()) progress(stage, share);
     };
     const FlowEstimator estimator = estimator_of(flow);
     const py::gil_scoped_release released;
-    return calibrate_parts(parts, r.views, s.views, d.views, initial, options, tell, estimator);
+    return calibrate_parts(parts, r.views, s.views, d.views, initial, options, notify, estimator);
 }
 
 CalibrationResult calibrated(const py::sequence& references, const py::sequence& sources,

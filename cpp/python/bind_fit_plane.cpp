@@ -15,13 +15,13 @@ void bind_fit_plane(py::module_& m) {
            const Rig& rig, const CalibrationOptions& options, const py::object& progress) {
             const HeldList r = list_of("reference", references, image_of);
             const HeldList s = list_of("source", sources, image_of);
-            const auto tell = [&progress] {
+            const auto notify = [&progress] {
                 const py::gil_scoped_acquire gil;
                 if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
                 if (!progress.is_none()) progress();
             };
             const py::gil_scoped_release released;
-            return fit_plane(r.views, s.views, plane, rig, options, tell);
+            return fit_plane(r.views, s.views, plane, rig, options, notify);
         },
         py::arg("references"), py::arg("sources"), py::arg("plane"), py::arg("rig"),
         py::arg("options"), py::arg("progress") = py::none(),

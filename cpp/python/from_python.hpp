@@ -28,7 +28,6 @@ auto in_python(const Call& call) {
 
 class PythonDepth : public Depth {
    public:
-    // Of a DepthProvider.
     explicit PythonDepth(py::object provider)
         : concurrent_(provider.attr("is_parallel").cast<bool>()),
           steadied_(provider.attr("is_steady").cast<bool>()), provider_(kept(std::move(provider))) {

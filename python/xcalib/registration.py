@@ -39,7 +39,7 @@ class RegistrationOptions:
     occlusion: str = "mark"
     """That of `Registrar`."""
     overwrite: bool = False
-    """Begin anew where an earlier run has written."""
+    """Start again where an earlier run has written."""
 
 
 def run_registration(

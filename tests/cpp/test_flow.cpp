@@ -54,21 +54,21 @@ struct Confident {
 };
 
 Confident judge(const FlowField& flow, const Field& dx, const Field& dy) {
-    int told = 0, right = 0;
+    int known = 0, right = 0;
     Confident out;
     for (int row = 0; row < flow.height; ++row)
         for (int column = 0; column < flow.width; ++column) {
             const int i = row * flow.width + column;
             if (flow.confidence[i] < 0.5) continue;
-            ++told;
+            ++known;
             const double x = column * flow.step + flow.step / 2;
             const double y = row * flow.step + flow.step / 2;
             const double error = std::hypot(flow.x[i] - dx(x, y), flow.y[i] - dy(x, y));
             right += error < 0.5;
             out.largest = std::max(out.largest, error);
         }
-    out.share = static_cast<double>(told) / static_cast<double>(flow.x.size());
-    out.right = told > 0 ? static_cast<double>(right) / told : 0;
+    out.share = static_cast<double>(known) / static_cast<double>(flow.x.size());
+    out.right = known > 0 ? static_cast<double>(right) / known : 0;
     return out;
 }
 

@@ -150,7 +150,7 @@ struct OnePair {
         return value;
     }
 
-    // Of the cost, in the tangent of the manifolds.
+    // The gradient of the cost, in the tangent of the manifolds.
     std::vector<double> gradient() {
         std::vector<double> values;
         EXPECT_TRUE(problem.Evaluate({}, nullptr, nullptr, &values, nullptr));

@@ -213,7 +213,7 @@ void expect_nearest_pixels_as_they_are(int channels) {
                 continue;
             }
             const Eigen::Vector2d p = mapped(rig, x, y, depth.row(y)[x]);
-            // Float coordinates cannot tell which side of a border between pixels a point is on.
+            // Float coordinates do not decide which side of a border between pixels a point is on.
             const auto to_border = [](double a) { return std::abs(a - std::floor(a) - 0.5); };
             if (std::min(to_border(p.x()), to_border(p.y())) < 1e-3) continue;
             ++valid;

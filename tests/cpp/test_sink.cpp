@@ -216,19 +216,19 @@ TEST(VideoImages, AreWhatTheSuffixHolds) {
     const ImageView u8{nullptr, 4, 2, 3, PixelType::u8, 0}, odd{nullptr, 5, 2, 1, PixelType::u8, 0},
         u16{nullptr, 4, 2, 1, PixelType::u16, 0}, deep{nullptr, 4, 2, 3, PixelType::u16, 0},
         f32{nullptr, 4, 2, 1, PixelType::f32, 0};
-    const auto told = [](const char* file, const ImageView& image) {
+    const auto message = [](const char* file, const ImageView& image) {
         return refusal([&] { check_video_image(file, image); });
     };
-    EXPECT_EQ(told("a.mp4", u8), "");
-    EXPECT_EQ(told("a.MKV", u16), "");
-    EXPECT_EQ(told("a.mp4", u16),
+    EXPECT_EQ(message("a.mp4", u8), "");
+    EXPECT_EQ(message("a.MKV", u16), "");
+    EXPECT_EQ(message("a.mp4", u16),
               "a.mp4: the images are uint16 gray; .mp4 holds uint8, a folder holds any");
     EXPECT_EQ(
-        told("a.mkv", deep),
+        message("a.mkv", deep),
         "a.mkv: the images are uint16 colour; .mkv holds uint8 and gray uint16, a folder holds"
         " any");
-    EXPECT_TRUE(has(told("a.mkv", f32), "float32 gray"));
-    EXPECT_EQ(told("a.avi", odd),
+    EXPECT_TRUE(has(message("a.mkv", f32), "float32 gray"));
+    EXPECT_EQ(message("a.avi", odd),
               "a.avi: the images are 5x2; a video holds even sizes, a folder any");
 }
 

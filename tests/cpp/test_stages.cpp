@@ -133,15 +133,15 @@ TEST_P(BrokenStage, EndsAllButTheFramesBefore) {
                                   throw std::out_of_range("frame " + std::to_string(frame));
                               if (place == 3) written.add(frame);
                           }});
-    int told = 0;
+    int reported = 0;
     try {
-        run_stages(100, stages, threads, [&](int done, const BusyShares&) { told = done; });
+        run_stages(100, stages, threads, [&](int done, const BusyShares&) { reported = done; });
         FAIL();
     } catch (const std::out_of_range& error) {  // with its type
         EXPECT_STREQ(error.what(), "frame 7");
     }
     EXPECT_EQ(written.frames(), first(7));  // all before it, and nothing after it
-    EXPECT_EQ(told, 7);
+    EXPECT_EQ(reported, 7);
 }
 
 TEST(Stages, TheEarliestFrameNamesTheError) {
@@ -186,10 +186,10 @@ TEST(Stages, TellTheCallerWhileNothingIsDone) {
 }
 
 TEST(Stages, OfNoFrames) {
-    int told = -1;
+    int reported = -1;
     run_stages(0, {{"a", true, [](int, int) { FAIL(); }}}, 2,
-               [&](int done, const BusyShares&) { told = done; });
-    EXPECT_EQ(told, 0);
+               [&](int done, const BusyShares&) { reported = done; });
+    EXPECT_EQ(reported, 0);
 }
 
 TEST(Stages, BusySharesShowWhatTheOthersWaitFor) {

@@ -79,8 +79,8 @@ TEST(LoadedFrames, AreThoseThatCanBeDecoded) {
     const Frames frames{std::make_shared<PlainStream>("v", 9),
                         std::make_shared<PlainStream>("t", 9, true, broken),
                         std::make_shared<PlainDepth>()};
-    std::vector<int> told;
-    const auto note = [&](int done) { told.push_back(done); };
+    std::vector<int> reported;
+    const auto note = [&](int done) { reported.push_back(done); };
     const LoadedFrames loaded = load_frames(frames, {2, 3, 5, 8}, note);
     EXPECT_EQ(loaded.indices, (std::vector<int>{2, 8}));
     EXPECT_EQ(value(loaded.frames[1].source), 8);
@@ -88,7 +88,7 @@ TEST(LoadedFrames, AreThoseThatCanBeDecoded) {
     EXPECT_EQ(loaded.failures, 2);
     EXPECT_EQ(left_out(loaded.failures, loaded.first_failure),
               "2 unusable frames are left out; frame 3");
-    EXPECT_EQ(told, (std::vector<int>{1, 2, 3, 4}));
+    EXPECT_EQ(reported, (std::vector<int>{1, 2, 3, 4}));
     EXPECT_THROW(load_frames(frames, {3, 5}, note), DecodeError);
     EXPECT_EQ(refusal([&] { load_frames(frames, {}, note); }), "no frame to calibrate on");
 }

@@ -29,7 +29,7 @@ inline constexpr int kEdgeMapWidth = 400;  // [px]
 EdgeMap edge_map(const Image& image, float floor = kEdgeFloor);
 
 // Averaged over the area of each new pixel (a side that would grow is left as it is), less the mean
-// of some pixels around: what all edges of a region have in common does not tell where it lies.
+// of some pixels around: what all edges of a region have in common does not show where it lies.
 EdgeMap reduced(const EdgeMap& edges, int width, int height);
 
 }  // namespace xcalib

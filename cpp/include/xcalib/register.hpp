@@ -14,7 +14,7 @@ namespace XCALIB_EXPORT xcalib {
 // Reference pixels that the source camera sees something nearer in front of.
 enum class Occlusion {
     ignore,  // are not looked for
-    mark,    // are told by the mask; the image shows what is in front: holes would be edges
+    mark,    // the mask marks them; the image shows what is in front: holes would be edges
     hide,    // are 0 in the image too, and NaN in the map: nothing is seen twice
 };
 

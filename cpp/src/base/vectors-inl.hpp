@@ -36,7 +36,7 @@ HWY_INLINE int lanes() { return static_cast<int>(hn::Lanes(FloatTag())); }
 HWY_INLINE Float set(double value) { return hn::Set(FloatTag(), static_cast<float>(value)); }
 HWY_INLINE Int set(int value) { return hn::Set(IntTag(), value); }
 HWY_INLINE Float load(const float* from) { return hn::LoadU(FloatTag(), from); }
-// Of `left` that there are, 0 past them.
+// The `left` that there are, 0 past them.
 HWY_INLINE Float load(const float* from, int left) {
     if (left >= kLanes) return load(from);
     HWY_ALIGN float room[kLanes] = {};

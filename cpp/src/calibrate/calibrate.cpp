@@ -46,8 +46,8 @@ void validate(const std::vector<ImageView>& references, const std::vector<ImageV
 }
 
 // Levenberg-Marquardt on all frames, from the level at which the start was found on some of them.
-void refine(const WorkingImages& images, const Start& found, const Plan& plan, const Progress& tell,
-            CalibrationResult& result) {
+void refine(const WorkingImages& images, const Start& found, const Plan& plan,
+            const Progress& notify, CalibrationResult& result) {
     CalibrationReport& report = result.report;
     const int num_threads = plan.options.num_threads;
     report.candidates = found.candidates;
@@ -67,7 +67,8 @@ void refine(const WorkingImages& images, const Start& found, const Plan& plan, c
         if (limit == 0) limit = share_limit(pooled(level, result.rig, num_threads).valid_share);
         report.levels.push_back(solve_stage(images, level, steps[s].stage, limit,
                                             tolerance(steps[s].factor), plan, result.rig));
-        tell("refine", 0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
+        notify("refine",
+               0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
     }
 }
 
@@ -164,7 +165,7 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
                                   const CalibrationOptions& options, const Progress& progress,
                                   const FlowEstimator& flow) {
     const double start = seconds_now();
-    const Progress tell = [&](const std::string& stage, double share) {
+    const Progress notify = [&](const std::string& stage, double share) {
         if (progress) progress(stage, share);
     };
     const Plan plan(options, flow, parts);
@@ -174,7 +175,7 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     CalibrationResult result;
     result.report.frames =
         draw_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
-    tell("prepare", 0.0);
+    notify("prepare", 0.0);
     const auto images = std::make_shared<const WorkingImages>(
         make_working_images(references, sources, depths, result.report.frames, plan));
     result.report.working_width = images->references[0].width;
@@ -185,31 +186,32 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     Attempt attempt(images, plan, initial, mount);
     double search_seconds = 0.0;
     if (options.solver == Solver::adam) {
-        tell("refine", 0.05);
+        notify("refine", 0.05);
         result.rig = given_start(references[0], sources[0], attempt.initial, attempt.plan.options);
         solve_adam(
             *attempt.images, attempt.plan,
-            [&](double share) { tell("refine", 0.05 + 0.9 * share); }, result.rig, result.report);
+            [&](double share) { notify("refine", 0.05 + 0.9 * share); }, result.rig, result.report);
         settle(attempt, result);
     } else {
-        tell("search", 0.05);
+        notify("search", 0.05);
         const Start found =
             find_start(*attempt.images, references[0], sources[0], attempt.initial, attempt.plan,
-                       [&](double share) { tell("search", 0.05 + 0.55 * share); });
+                       [&](double share) { notify("search", 0.05 + 0.55 * share); });
         search_seconds = found.search_seconds;
         const CalibrationResult empty = result;
-        refine(*attempt.images, found, attempt.plan, tell, result);
+        refine(*attempt.images, found, attempt.plan, notify, result);
         settle(attempt, result);
         if (!result.converged && plan.searches && !initial && !options.mount) {
-            tell("mount", 0.96);
+            notify("mount", 0.96);
             if (auto turned = best_turned(images, references[0], sources[0], plan, found)) {
                 result = empty;
-                refine(*turned->attempt.images, turned->start, turned->attempt.plan, tell, result);
+                refine(*turned->attempt.images, turned->start, turned->attempt.plan, notify,
+                       result);
                 settle(turned->attempt, result);
             }
         }
     }
-    tell("judge", 1.0);
+    notify("judge", 1.0);
     result.report.seconds = seconds_now() - start;
     result.report.time = images->times->seconds(resolve_threads(options.num_threads));
     result.report.time.search = search_seconds;

@@ -12,7 +12,8 @@ struct Sample {
     T value, du, dv;
 };
 
-// Of width x height values; (u, v) within [0, width - 1] x [0, height - 1]; both sides at least 2.
+// Interpolates width x height values, both at least 2, at (u, v) within [0, width - 1] x
+// [0, height - 1].
 template <class T>
 Sample<T> bilinear(const T* values, int width, int height, float u, float v) {
     // The last cell serves its far edge too, so that all four values exist.

@@ -93,7 +93,7 @@ Edges halved(const Edges& edges) {
     return out;
 }
 
-// As they are compared: what all edges of a region have in common does not tell where it lies.
+// As they are compared: what all edges of a region have in common does not show where it lies.
 Edges comparable(const Edges& edges) {
     Edges out;
     out.weight = edges.weight;
@@ -175,7 +175,7 @@ std::vector<float> patch_profile(int cells) {
     return out;
 }
 
-// Of all patches of a at all shifts of b.
+// Correlates all patches of a with b at all shifts.
 Volume correlate(const Edges& a, const Edges& b, int radius, const FlowOptions& options,
                  int num_threads) {
     const int side = 2 * radius + 1;
@@ -251,7 +251,7 @@ cv::Mat grid_mat(const FlowField& field, const std::vector<float>& values) {
     return {field.height, field.width, CV_32F, const_cast<float*>(values.data())};
 }
 
-// Grid points that cannot tell take what their neighbours say.
+// Grid points that have no sure shift take what their neighbours say.
 cv::Mat smoothed(const cv::Mat& values, const cv::Mat& weight) {
     cv::Mat above = values.mul(weight), below;
     cv::GaussianBlur(above, above, cv::Size(), 1.5, 1.5, cv::BORDER_CONSTANT);

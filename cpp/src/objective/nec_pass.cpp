@@ -196,7 +196,7 @@ NecSums append_row(const Stencil& s, PassTile& tile) {
                 hn::MulAdd(radial, ny, hn::Mul(v.across, dg.y)));
         }
         put(tile, tile.count, edge, vx, vy);
-        // Of the polarity the source has to the reference.
+        // The reference's gradient, with the polarity of the source.
         const Mask opposed = hn::Lt(hn::MulAdd(ax, vx, hn::Mul(ay, vy)), hn::Zero(d));
         put(tile, tile.count + 1, edge, hn::IfThenElse(opposed, hn::Neg(ax), ax),
             hn::IfThenElse(opposed, hn::Neg(ay), ay));

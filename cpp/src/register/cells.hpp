@@ -7,7 +7,7 @@
 
 namespace xcalib {
 
-// Of 1/z [1/m], the upper half of a float: rounded down to 1 in 128, so that no point hides itself.
+// The upper half of 1/z [1/m] as a float: rounded down to 1 in 128, so that no point hides itself.
 // 0 where nothing is.
 using Nearness = std::uint16_t;
 

@@ -25,7 +25,7 @@ namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Of a row with this shift, in these units, rounding cuts down to a whole 1/256 px.
+// In a row with this shift and these units rounding cuts down to a whole 1/256 px.
 constexpr int kFixedBits = 8;
 constexpr double kFixedUnit = 1 << kFixedBits, kFixedShift = kHalfBack / kFixedUnit;
 
@@ -33,9 +33,9 @@ constexpr double kFixedUnit = 1 << kFixedBits, kFixedShift = kHalfBack / kFixedU
 constexpr int kFixedWindow = 64;
 
 HWY_INLINE bool fits_fixed(const Source& source, Reach reach) {
-    constexpr int kMostPixels = 16000;  // beyond, a float does not hold such a number
-    return reach != Reach::none && source.width >= kFixedWindow && source.width <= kMostPixels &&
-           source.height <= kMostPixels;
+    constexpr int kMaxPixels = 16000;  // beyond, a float does not hold such a number
+    return reach != Reach::none && source.width >= kFixedWindow && source.width <= kMaxPixels &&
+           source.height <= kMaxPixels;
 }
 
 // Whether all points lie in the window that begins at this offset. Those that do are written to

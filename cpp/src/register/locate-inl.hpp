@@ -56,7 +56,7 @@ struct Located {
     }
 };
 
-// Of a row that is shifted by this, rounding cuts down to a whole number.
+// In a row that is shifted by this rounding cuts down to a whole number.
 constexpr double kHalfBack = -0.5;
 HWY_INLINE Located locate(const Row& row, Float depth, Float x) {
     const Homogeneous p = multiplied(row, depth, x);
@@ -90,7 +90,7 @@ struct DepthRow {
     HWY_INLINE void prefetch_next_row(int x) const {
         hwy::Prefetch(data + stride + static_cast<std::ptrdiff_t>(x) * bytes);
     }
-    // Of `left` that there are; 0 past them.
+    // The `left` that there are; 0 past them.
     HWY_INLINE Float load(int x, int left) const {
         if (left >= kLanes) return load(x);
         HWY_ALIGN char room[kLanes * 4] = {};

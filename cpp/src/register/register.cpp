@@ -16,12 +16,12 @@
 namespace xcalib {
 namespace {
 
-// Of the cells, one part a thread: each costs memory, and to join them costs time.
-constexpr int kMostParts = 8;
+// One copy of the cells a thread: each costs memory, and to join them costs time.
+constexpr int kMaxParts = 8;
 // Rows that a thread takes at a time, so that one that is held up keeps no other waiting.
 constexpr int kRows = 32;
 // The kernel's floats count whole pixels up to here.
-constexpr int kMostSourcePixels = 4000000;
+constexpr int kMaxSourcePixels = 4000000;
 
 void require_size(const char* name, int width, int height, const Pinhole& camera) {
     if (width == camera.width && height == camera.height) return;
@@ -70,7 +70,7 @@ struct Registrar::Stream {
 
     Stream(const Rig& for_rig, const RegistrarOptions& with)
         : rig(for_rig), options(with), projector(rig), grid(rig),
-          parts(std::min(resolve_threads(options.num_threads), kMostParts)),
+          parts(std::min(resolve_threads(options.num_threads), kMaxParts)),
           // Cameras at one place see the same.
           occlusion(options.occlusion != Occlusion::ignore && rig.t().norm() > 0),
           workers(resolve_threads(options.num_threads)) {
@@ -132,10 +132,10 @@ Registrar::Registrar(const Rig& rig, const RegistrarOptions& options) {
     options.validate();
     if (rig.source.width < 2 || rig.source.height < 2)
         throw std::invalid_argument("source is narrower than 2 px, too small to interpolate");
-    if (std::max(rig.source.width, rig.source.height) > kMostSourcePixels) {
+    if (std::max(rig.source.width, rig.source.height) > kMaxSourcePixels) {
         std::ostringstream message;
         message << "source is " << rig.source.width << "x" << rig.source.height
-                << ", expected at most " << kMostSourcePixels << " px a side";
+                << ", expected at most " << kMaxSourcePixels << " px a side";
         throw std::invalid_argument(message.str());
     }
     stream_ = std::make_unique<Stream>(rig, options);

@@ -119,7 +119,7 @@ constexpr int window() {
     if (XCALIB_LOOK_UP_16 && sizeof(T) == 2) return 32;
     return (sizeof(T) == 1 ? 16 : kLanes) * (reach == Reach::two ? 2 : 1);
 }
-// Of a window, as many pixels lie before the first of a vector's points.
+// So many pixels of a window lie before the first of a vector's points.
 template <class T, Reach reach>
 constexpr int kBefore = window<T, reach>() / 8;
 
@@ -238,9 +238,9 @@ struct Source {
 
 // -- What hides a point ---------------------------------------------------------------------------
 
-// Of the two cells that a point lies between, or on its row or column in, the upper left, shifted
-// by kLarge. A silhouette lies anywhere between the last pixel on it and the first beside it: half
-// a cell to both sides, along the way that near points move, is searched.
+// The upper left one of the two cells that a point lies between, shifted by kLarge. A silhouette
+// lies anywhere between the last pixel on it and the first beside it: half a cell to both sides,
+// along the way that near points move, is searched.
 struct Cells {
     Float x, y;
 

@@ -52,7 +52,7 @@ Unit unit_of(const std::string& line) {
     return unit;
 }
 
-// Of values by name: the first that are not the same; of another command's that alone.
+// The first values that are not the same, by name; the command alone, if that differs.
 std::string differences(const Json& before, const Json& now) {
     std::string text;
     int count = 0;

@@ -26,7 +26,7 @@ std::string percentages(const BusyShares& busy) {
     return text;
 }
 
-// Frames a second, by the median; 25 where the stream does not tell.
+// Frames a second, by the median; 25 where the stream does not say.
 double frame_rate(const Stream& stream) {
     const double period = stream.times ? median_period(*stream.times) : 0.0;
     return period > 0 ? 1 / period : 25.0;

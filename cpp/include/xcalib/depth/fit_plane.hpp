@@ -12,7 +12,7 @@
 
 namespace XCALIB_EXPORT xcalib {
 
-// Of `count` frames, those that judge a plane: at most a dozen, evenly spread.
+// Those of `count` frames that judge a plane: at most a dozen, evenly spread.
 std::vector<int> frames_to_judge_plane(int count);
 
 // The plane near `plane` whose best rig aligns most edges: a horizon that is a few pixels off bends

@@ -19,7 +19,7 @@ namespace XCALIB_EXPORT xcalib {
 //
 // When the rig moves, edges move in both images, and the amount of that rises and falls together.
 // The change of the edges from frame to frame is taken in the cells of a coarse grid, so that
-// different parts of the scene tell, and correlated over time.
+// different parts of the scene show, and correlated over time.
 
 struct OffsetEstimate {
     double offset = 0.0;  // by how much the source's clock is late [s]; 0 where it cannot be known

@@ -17,8 +17,8 @@ class Depth {
    public:
     virtual ~Depth() = default;
 
-    // Of frame `index`, whose reference image is given: one channel, float32 [m], 0 unknown, any
-    // size of the reference's aspect.
+    // The depth of frame `index`, whose reference image is given: one channel, float32 [m], 0
+    // unknown, any size of the reference's aspect.
     virtual Picture operator()(int index, const Picture& reference) = 0;
     virtual std::vector<std::filesystem::path> files(int) const { return {}; }  // it is made from
     virtual bool concurrent() const { return false; }  // may several threads ask, in any order?

@@ -19,7 +19,7 @@ struct RegistrationOptions {
     // Its num_threads are those of the whole run; with 1 nothing overlaps.
     RegistrarOptions registrar;
     bool overlays = false;
-    bool overwrite = false;  // begin anew where an earlier run has written
+    bool overwrite = false;  // start again where an earlier run has written
     int part_frames = kPartFrames;
 };
 
