@@ -30,13 +30,11 @@ Eigen::Vector3d turn(const Rig& a, const Rig& b) {
 
 TEST(Adam, JacobianAgreesWithCentralDifferences) {
     std::mt19937 random(2);
-    const Rig sizes = random_rig(random, kWidth, kHeight, 180, 144);
-    PaperVector x = vector_of(paper_from_rig(sizes));
+    const Rig rest = random_rig(random, kWidth, kHeight, 180, 144);
+    PaperVector x = vector_of(paper_from_rig(rest));
     x.segment<4>(kPaperQuaternion) *= 1.7;  // any norm will do
-    const auto rig_at = [&](const PaperVector& at) {
-        return rig_from_paper(paper_of(at), kWidth, kHeight, 180, 144);
-    };
-    const auto jacobian = paper_jacobian(paper_of(x), sizes);
+    const auto rig_at = [&](const PaperVector& at) { return rig_from_paper(paper_of(at), rest); };
+    const auto jacobian = paper_jacobian(paper_of(x), rest);
     for (int v = 0; v < kNumPaperVariables; ++v) {
         constexpr double kStep = 1e-5;
         PaperVector up = x, down = x;

@@ -58,8 +58,8 @@ struct PaperParameters {
 
 inline constexpr double kPaperTranslationScale = 10.0;  // lambda_t
 
-Rig rig_from_paper(const PaperParameters& parameters, int reference_width, int reference_height,
-                   int source_width, int source_height);
+// What is no parameter, as the image sizes and the lenses, is that of `rest`.
+Rig rig_from_paper(const PaperParameters& parameters, const Rig& rest);
 // The translation goes to the finest component whole: the split is not unique.
 PaperParameters paper_from_rig(const Rig& rig);
 
@@ -78,7 +78,7 @@ struct SolverParameters {
 };
 
 SolverParameters solver_from_rig(const Rig& rig);
-Rig rig_from_solver(const SolverParameters& parameters, int reference_width, int reference_height,
-                    int source_width, int source_height);
+// What is no parameter, as the image sizes and the lenses, is that of `rest`.
+Rig rig_from_solver(const SolverParameters& parameters, const Rig& rest);
 
 }  // namespace xcalib

@@ -183,8 +183,7 @@ void solve_adam(const WorkingImages& images, const Plan& plan,
                 (loss.image_gradient + options.flow_weight * loss.flow_gradient) +
             gamma * prior.gradient;
         adam.step(x, gradient, frozen(stage, options), taken.learning_rate);
-        rig = rig_from_paper(paper_of(x), rig.reference.width, rig.reference.height,
-                             rig.source.width, rig.source.height);
+        rig = rig_from_paper(paper_of(x), rig);
         progress(static_cast<double>(step + 1) / static_cast<double>(count));
 
         if (step + 1 != fine_from && step + 1 != count) continue;

@@ -12,10 +12,9 @@ double paper_half_vfov(int width, int height) {
     return std::atan(static_cast<double>(height) / width * std::tan(kPi / 8));
 }
 
-Pinhole pinhole_from_paper(const PaperParameters::Camera& p, int width, int height) {
-    Pinhole camera;
-    camera.width = width;
-    camera.height = height;
+Pinhole pinhole_from_paper(const PaperParameters::Camera& p, const Pinhole& rest) {
+    Pinhole camera = rest;
+    const int width = rest.width, height = rest.height;
     camera.fx = width / (2 * std::tan(p.fx * kPi / 8));
     camera.fy = height / (2 * std::tan(p.fy * paper_half_vfov(width, height)));
     camera.cx = p.cx * width - 0.5;
@@ -35,10 +34,9 @@ PaperParameters::Camera paper_from_pinhole(const Pinhole& camera) {
     return p;
 }
 
-Pinhole pinhole_from_solver(const SolverParameters::Camera& p, int width, int height) {
-    Pinhole camera;
-    camera.width = width;
-    camera.height = height;
+Pinhole pinhole_from_solver(const SolverParameters::Camera& p, const Pinhole& rest) {
+    Pinhole camera = rest;
+    const int width = rest.width, height = rest.height;
     camera.fx = std::exp(p.log_f[0]) * width;
     camera.fy = std::exp(p.log_f[1]) * height;
     camera.cx = p.center[0] * width - 0.5;
@@ -55,12 +53,11 @@ SolverParameters::Camera solver_from_pinhole(const Pinhole& camera) {
 
 }  // namespace
 
-Rig rig_from_paper(const PaperParameters& parameters, int reference_width, int reference_height,
-                   int source_width, int source_height) {
+Rig rig_from_paper(const PaperParameters& parameters, const Rig& rest) {
     const Eigen::Vector4d q = parameters.quaternion.normalized();
-    Rig rig;
-    rig.reference = pinhole_from_paper(parameters.reference, reference_width, reference_height);
-    rig.source = pinhole_from_paper(parameters.source, source_width, source_height);
+    Rig rig = rest;
+    rig.reference = pinhole_from_paper(parameters.reference, rest.reference);
+    rig.source = pinhole_from_paper(parameters.source, rest.source);
     rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
     constexpr double kScale = kPaperTranslationScale;
     rig.source_from_reference.translation =
@@ -86,13 +83,12 @@ SolverParameters solver_from_rig(const Rig& rig) {
             {rig.t().x(), rig.t().y(), rig.t().z()}};
 }
 
-Rig rig_from_solver(const SolverParameters& parameters, int reference_width, int reference_height,
-                    int source_width, int source_height) {
+Rig rig_from_solver(const SolverParameters& parameters, const Rig& rest) {
     const double* q = parameters.quaternion;
     const double* t = parameters.translation;
-    Rig rig;
-    rig.reference = pinhole_from_solver(parameters.reference, reference_width, reference_height);
-    rig.source = pinhole_from_solver(parameters.source, source_width, source_height);
+    Rig rig = rest;
+    rig.reference = pinhole_from_solver(parameters.reference, rest.reference);
+    rig.source = pinhole_from_solver(parameters.source, rest.source);
     rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
     rig.source_from_reference.translation = Eigen::Vector3d(t[0], t[1], t[2]);
     return rig;

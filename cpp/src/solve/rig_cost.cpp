@@ -50,7 +50,7 @@ CompressedBlock compress(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& 
     return block;
 }
 
-RigCost::RigCost(const Rig& sizes, const Parameters& free) : sizes_(sizes), free_(free) {
+RigCost::RigCost(const Rig& sizes, const Parameters& free) : rest_(sizes), free_(free) {
     for (const Block& block : kBlocks) mutable_parameter_block_sizes()->push_back(block.ambient);
     set_num_residuals(free.size() + 1);
 }
@@ -65,8 +65,7 @@ bool RigCost::Evaluate(double const* const* parameters, double* residuals,
     SolverParameters p;
     const std::vector<double*> targets = blocks(p);
     for (int b = 0; b < kNumBlocks; ++b) std::copy_n(parameters[b], kBlocks[b].ambient, targets[b]);
-    const Rig rig = rig_from_solver(p, sizes_.reference.width, sizes_.reference.height,
-                                    sizes_.source.width, sizes_.source.height);
+    const Rig rig = rig_from_solver(p, rest_);
     const int count = num_residuals() - 1;
     if (!jacobians) {
         std::fill_n(residuals, count, 0.0);

@@ -30,15 +30,15 @@ class RigCost : public ceres::CostFunction {
     static std::vector<double*> blocks(SolverParameters& parameters);
 
    protected:
-    // `sizes`: a rig of the image sizes that `cost` and `linearized` are to get one of. `free`:
-    // what the solver may move, beyond which nothing is differentiated.
-    RigCost(const Rig& sizes, const Parameters& free);
+    // `rest`: the image sizes, lenses and whatever else is no parameter of the rigs that `cost` and
+    // `linearized` get. `free`: what the solver may move, beyond which nothing is differentiated.
+    RigCost(const Rig& rest, const Parameters& free);
 
     virtual double cost(const Rig& rig) const = 0;
     virtual CompressedBlock linearized(const Rig& rig, const Parameters& free) const = 0;
 
    private:
-    Rig sizes_;
+    Rig rest_;
     Parameters free_;
     // The last linearization and where it was: Ceres calls each block from one thread at a time,
     // and asks twice at the last place.

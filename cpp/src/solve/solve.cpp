@@ -170,8 +170,7 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     if (const auto& times = level.pairs[0]->times)
         times->solver += static_cast<std::int64_t>(1e9 * own);
 
-    rig = rig_from_solver(p, rig.reference.width, rig.reference.height, rig.source.width,
-                          rig.source.height);
+    rig = rig_from_solver(p, rig);
     LevelReport report = report_on(level, stage, rig, options.num_threads);
     report.iterations = static_cast<int>(summary.iterations.size());
     report.initial_cost = summary.initial_cost;
