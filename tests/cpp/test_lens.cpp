@@ -13,7 +13,6 @@
 namespace xcalib {
 namespace {
 
-using ::xcalib::testing::has;
 using ::xcalib::testing::random_lens;
 using ::xcalib::testing::random_rig;
 using ::xcalib::testing::refusal;
@@ -80,18 +79,23 @@ TEST(Lens, TheFirstFoldCountsHoweverManyThereAre) {
 
 TEST(Lens, UndistortInvertsDistortWhereverThereIsAnImage) {
     std::mt19937 random(1);
+    int compared = 0;
     for (int i = 0; i < 3000; ++i) {
         const Lens lens = random_lens(random);
-        const double most = std::min(2.0, 0.98 * lens.max_radius());
+        const double most = std::min(2.0, 0.9 * lens.max_radius());
         const double r = uniform(random, 0, most), direction = uniform(random, 0, 6.28);
         const Eigen::Vector2d point(r * std::cos(direction), r * std::sin(direction));
+        // Where r' hardly grows, p1 and p2 are enough to fold the image: two points are shown
+        // there.
+        if (lens.derivative(point).inverse().norm() > 50) continue;
         const auto shown = lens.distort(point);
         ASSERT_TRUE(shown);
         const auto back = lens.undistort(*shown);
-        ASSERT_TRUE(back) << i << " " << lens.coefficients()[0] << " " << point.transpose();
-        EXPECT_LT((*back - point).norm(),
-                  1e-9 * std::max(1.0, lens.derivative(point).inverse().norm()));
+        ASSERT_TRUE(back) << i << ": " << point.transpose();
+        EXPECT_LT((*back - point).norm(), 1e-9) << i << ": " << point.transpose();
+        ++compared;
     }
+    EXPECT_GT(compared, 2900);
 }
 
 TEST(Lens, DerivativesAgreeWithCentralDifferences) {
@@ -136,17 +140,18 @@ TEST(Lens, FlippedIsWhatAMirrorImageShows) {
 }
 
 TEST(Lens, RefusesWhatItCannotBe) {
-    EXPECT_TRUE(has(refusal([] {
-                        Lens(LensModel::brown, {1, 2, 3});
-                    }),
-                    {"brown", "3 coefficients", "4 (k1 k2 p1 p2)"}));
-    EXPECT_TRUE(has(refusal([] {
-                        Lens(LensModel::fisheye, {1, 2, 3, 4, 5});
-                    }),
-                    {"fisheye", "5 coefficients", "4 (k1 k2 k3 k4)"}));
-    EXPECT_TRUE(has(refusal([] { Lens(LensModel::none, {1}); }), {"none", "expected 0"}));
-    const Lens lens(LensModel::brown, {0, 0, 0, 0, NAN});
-    EXPECT_TRUE(has(refusal([&] { lens.validate("source"); }), {"source", "k3 = nan", "finite"}));
+    const auto refused = [](LensModel model, const std::vector<double>& coefficients) {
+        return refusal([&] { Lens(model, coefficients); });
+    };
+    EXPECT_EQ(refused(LensModel::brown, {1, 2, 3}),
+              "a lens of model brown has 3 coefficients, expected 4 (k1 k2 p1 p2), 5 (... k3) or 8 "
+              "(... k4 k5 k6)");
+    EXPECT_EQ(refused(LensModel::fisheye, {1, 2, 3, 4, 5}),
+              "a lens of model fisheye has 5 coefficients, expected 4 (k1 k2 k3 k4)");
+    EXPECT_EQ(refused(LensModel::none, {1}), "a lens of model none has 1 coefficients, expected 0");
+    const Lens lens(LensModel::brown, {0, 0, 0, 0, std::numeric_limits<double>::infinity()});
+    EXPECT_EQ(refusal([&] { lens.validate("source"); }),
+              "source: lens k3 = inf, expected a finite number");
 }
 
 TEST(Lens, CamerasProjectAndUnprojectThroughIt) {
