@@ -60,6 +60,9 @@ class Lens {
     // Throws std::invalid_argument naming `name`, the coefficient, its value and what was expected.
     void validate(const char* name) const;
 
+    bool operator==(const Lens& other) const;
+    bool operator!=(const Lens& other) const { return !(*this == other); }
+
    private:
     // f, and df / dr2.
     struct Radial {
@@ -75,11 +78,6 @@ class Lens {
     std::array<double, kMostCoefficients> coefficients_{};
     double max_radius_ = std::numeric_limits<double>::infinity();
 };
-
-inline bool operator==(const Lens& a, const Lens& b) {
-    return a.model() == b.model() && a.coefficients() == b.coefficients();
-}
-inline bool operator!=(const Lens& a, const Lens& b) { return !(a == b); }
 
 // "none", "brown", "fisheye".
 const char* name_of(LensModel model);

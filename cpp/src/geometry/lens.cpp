@@ -227,6 +227,10 @@ Lens Lens::flipped() const {
     return out;
 }
 
+bool Lens::operator==(const Lens& other) const {
+    return model_ == other.model_ && count_ == other.count_ && coefficients_ == other.coefficients_;
+}
+
 void Lens::validate(const char* name) const {
     const char* const* names = model_ == LensModel::fisheye ? kFisheyeNames : kBrownNames;
     for (std::size_t i = 0; i < count_; ++i)

@@ -44,7 +44,8 @@ HWY_INLINE void splat(const CellGrid& grid, Float depth, const Points& p,
 // The same of `count` vectors from pixel `begin` of a row on. Pixels of one surface fall into
 // neighbouring cells: all of a vector are written at once, where this moves none by more than half
 // a cell. Returns which remain to be done.
-HWY_INLINE Vectors splat_together(const CellGrid& grid, const Row& row, const DepthRow& depths,
+template <bool bends>
+HWY_INLINE Vectors splat_together(const CellGrid& grid, const AnyRow& row, const DepthRow& depths,
                                   int begin, int count, Nearness* HWY_RESTRICT cells) {
     const FloatTag d;
     const IntTag di;
@@ -56,7 +57,9 @@ HWY_INLINE Vectors splat_together(const CellGrid& grid, const Row& row, const De
     for (int i = 0; i < count; ++i) {
         const Float depth = depths.load(begin + i * kLanes);
         depths.prefetch_next_row(begin + i * kLanes);
-        const Points p = project<false>(row, depth, along);
+        Points p;
+        if constexpr (bends) p = project<false>(row.bent, depth, begin + i * kLanes);
+        else p = project<false>(row.straight, depth, along);
         const Float start = hn::Sub(p.u, hn::Iota(d, 0.0f));
         u[i] = hn::ExtractLane(start, kLanes / 2);
         v[i] = hn::ExtractLane(p.v, kLanes / 2);
@@ -95,18 +98,19 @@ void splat_rows(const Projector& projector, const DepthView& depth, const CellGr
                 int end, Nearness* HWY_RESTRICT cells) {
     const int width = depth.view.width;
     for (int y = begin; y < end; ++y) {
-        const Row row(projector.to_image, y, 0, grid.per_pixel_x, grid.per_pixel_y);
+        const AnyRow row(projector, y, 0, grid.per_pixel_x, grid.per_pixel_y);
         const DepthRow depths(depth, y);
         const auto splat_at = [&](int x) HWY_ATTR {
             const Float along = hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
             const Float z = depths.load(x, width - x);
-            splat(grid, z, project<false>(row, z, along), cells);
+            splat(grid, z, project<false>(row, z, along, x), cells);
         };
         int x = 0;
 #if HWY_TARGET != HWY_SCALAR
         while (width - x >= kLanes) {
             const int count = std::min(kVectors, (width - x) / kLanes);
-            Vectors left = splat_together(grid, row, depths, x, count, cells);
+            Vectors left = row.bends ? splat_together<true>(grid, row, depths, x, count, cells)
+                                     : splat_together<false>(grid, row, depths, x, count, cells);
             for (; left; left &= left - 1) splat_at(x + kLanes * first_of(left));
             x += count * kLanes;
         }

@@ -64,11 +64,12 @@ struct Stretch {
 HWY_INLINE bool none(Int bits) { return hn::AllTrue(IntTag(), hn::Eq(bits, hn::Zero(IntTag()))); }
 
 // Where `count` vectors lie, from pixel `begin` of row y on. `out` is where they will be written.
-template <bool fixed, bool with_cells>
-HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& depths, int y,
+template <bool fixed, bool with_cells, bool bends>
+HWY_INLINE void locate(const RowsTask& task, const AnyRow& row, const DepthRow& depths, int y,
                        int begin, int count, const char* out, int vector_bytes, Stretch& stretch) {
     const FloatTag d;
-    const Float least = hn::Set(d, task.projector->least_depth(y, task.depth.view.width));
+    const Float least =
+        hn::Set(d, bends ? 0.0f : task.projector->least_depth(y, task.depth.view.width));
     Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
     for (int i = 0; i < count; ++i) {
         UsualVector& vector = stretch.vectors[i];
@@ -76,9 +77,17 @@ HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& dep
         const Float depth = depths.load(x);
         depths.prefetch_next_row(x);
         __builtin_prefetch(out + (i + kVectors) * vector_bytes, 1);  // a stretch ahead
-        const Located at = locate(row, depth, along);
+        Located at;
+        Mask somewhere;
+        if constexpr (bends) {
+            at = locate(row.bent, depth, x);
+            somewhere = in_front(depth, at.points());
+        } else {
+            at = locate(row.straight, depth, along);
+            somewhere = hn::Gt(depth, least);
+        }
         // Elsewhere it is far outside.
-        const Float left = hn::IfThenElseZero(hn::Gt(depth, least), at.x);
+        const Float left = hn::IfThenElseZero(somewhere, at.x);
         hn::Store(left, d, vector.x);
         hn::Store(at.y, d, vector.y);
         stretch.source.start(i, left, at.y);
@@ -240,12 +249,24 @@ HWY_INLINE Vectors sample_fixed(const Source& source, int count, Stretch& stretc
 
 // A row for each way to locate.
 struct RowPair {
-    Row exact, fixed;
+    AnyRow exact, fixed;
 
     HWY_INLINE RowPair(const Projector& projector, int y)
-        : exact(projector.to_image, y, kHalfBack),
-          fixed(projector.to_image, y, kFixedShift, kFixedUnit, kFixedUnit) {}
+        : exact(projector, y, kHalfBack), fixed(projector, y, kFixedShift, kFixedUnit, kFixedUnit) {
+    }
 };
+
+template <bool fixed, bool with_cells>
+HWY_INLINE void locate_any(const RowsTask& task, const AnyRow& row, const DepthRow& depths, int y,
+                           int begin, int count, const char* out, int vector_bytes,
+                           Stretch& stretch) {
+    if (row.bends)
+        locate<fixed, with_cells, true>(task, row, depths, y, begin, count, out, vector_bytes,
+                                        stretch);
+    else
+        locate<fixed, with_cells, false>(task, row, depths, y, begin, count, out, vector_bytes,
+                                         stretch);
+}
 
 // Locates vectors of a row, `count` from pixel `begin` on, and samples them. Returns those of which
 // some points lie outside the source, or nowhere.
@@ -259,13 +280,14 @@ HWY_INLINE Vectors sample_stretch(const RowsTask& task, const Source& source, Re
 #if XCALIB_FIXED
     if constexpr (sizeof(T) == 1 && kChannels == 1) {
         if (fits_fixed(source, reach)) {
-            locate<true, with_cells>(task, row.fixed, depths, y, begin, count, to, kBytes, stretch);
+            locate_any<true, with_cells>(task, row.fixed, depths, y, begin, count, to, kBytes,
+                                         stretch);
             others = sample_fixed(source, count, stretch, out, mask);
             return gather<T, 1, true>(source, others, stretch, out, mask);
         }
     }
 #endif
-    locate<false, with_cells>(task, row.exact, depths, y, begin, count, to, kBytes, stretch);
+    locate_any<false, with_cells>(task, row.exact, depths, y, begin, count, to, kBytes, stretch);
     if constexpr (kChannels == 1) {
         if (reach == Reach::one)
             others = sample_windows<T, Reach::one>(source, count, stretch, out, mask);
