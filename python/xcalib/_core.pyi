@@ -12,6 +12,30 @@ class InputError(ValueError):
 class DecodeError(InputError):
     """A file that cannot be decoded: truncated, or not what its name says."""
 
+class Lens:
+    """What a lens does to a pinhole's image: OpenCV's models and coefficients."""
+
+    def __init__(self, model: str = "none", coefficients: Sequence[float] = []) -> None:
+        """x"""
+    @property
+    def model(self) -> str:
+        """x"""
+    @property
+    def coefficients(self) -> list[float]:
+        """x"""
+    @property
+    def bends(self) -> bool:
+        """x"""
+    @property
+    def max_radius(self) -> float:
+        """x"""
+    def distort(self, points: NDArray[Any]) -> NDArray[float64]:
+        """x"""
+    def undistort(self, points: NDArray[Any]) -> NDArray[float64]:
+        """x"""
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
 class Pinhole:
     """A pinhole camera, Eq. (intrinsic) of the paper.
 
@@ -32,6 +56,8 @@ class Pinhole:
     """[px]"""
     skew: float
     """[px]"""
+    lens: Lens
+    """Lens between (X/Z, Y/Z) and K."""
 
     def __init__(
         self,
@@ -42,12 +68,13 @@ class Pinhole:
         cx: float,
         cy: float,
         skew: float = 0.0,
+        lens: Lens = Lens(),
     ) -> None:
         """Raises ValueError where a size is below 1, a focal length not > 0, or a value not
         finite.
         """
     @staticmethod
-    def from_hfov(width: int, height: int, hfov_deg: float) -> Pinhole:
+    def from_hfov(width: int, height: int, hfov_deg: float, lens: Lens = Lens()) -> Pinhole:
         """Square pixels and the principal point at the centre; hfov_deg in (0, 180)."""
     @property
     def K(self) -> NDArray[float64]:
@@ -195,6 +222,10 @@ class CalibrationOptions:
     """Known intrinsics, frozen, or None."""
     source_camera: Pinhole | None
     """Known intrinsics, frozen, or None."""
+    reference_lens: Lens | None
+    """x"""
+    source_lens: Lens | None
+    """x"""
     reference_hfov_deg: float | None
     """Horizontal field of view to assume [deg], or None to search it."""
     optimize_reference: bool

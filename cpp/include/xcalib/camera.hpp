@@ -26,8 +26,9 @@ struct Pinhole {
     double skew = 0.0;  // [px]
     Lens lens = {};
 
-    // Square pixels, principal point at the image centre. hfov in (0, pi).
-    static Pinhole from_hfov(int width, int height, double hfov);
+    // Square pixels, principal point at the image centre; hfov() is this. hfov in (0, pi), and what
+    // the lens shows.
+    static Pinhole from_hfov(int width, int height, double hfov, const Lens& lens = {});
     // The inverse of K(); K may have any scale.
     static Pinhole from_K(int width, int height, const Eigen::Matrix3d& K);
 
@@ -44,6 +45,8 @@ struct Pinhole {
         double width() const { return right - left; }
     };
     Field field() const;
+    // That of an image centred on the optical axis, without a lens: width / fx.
+    double width_by_focal() const { return width / fx; }
     // Beside the optical axis, where no lens bends, along x and y.
     Eigen::Vector2d pixels_per_radian() const { return {fx, fy}; }
 

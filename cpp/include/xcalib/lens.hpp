@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "xcalib/export.hpp"
@@ -60,6 +61,12 @@ class Lens {
     // Throws std::invalid_argument naming `name`, the coefficient, its value and what was expected.
     void validate(const char* name) const;
 
+    // "none", "brown:K1,K2,P1,P2[,K3[,K4,K5,K6]]" or "fisheye:K1,K2,K3,K4", or "auto": none given.
+    // Throws InputError, naming `option`, where it is none of these.
+    static std::optional<Lens> parse(const std::string& option, const std::string& word);
+    // What parse() takes for it.
+    static std::string word(const std::optional<Lens>& lens);
+
     bool operator==(const Lens& other) const;
     bool operator!=(const Lens& other) const { return !(*this == other); }
 
@@ -79,7 +86,8 @@ class Lens {
     double max_radius_ = std::numeric_limits<double>::infinity();
 };
 
-// "none", "brown", "fisheye".
+// "none", "brown", "fisheye", and back; none of the models where it is no name of one.
 const char* name_of(LensModel model);
+std::optional<LensModel> lens_model_of(const std::string& name);
 
 }  // namespace xcalib

@@ -87,6 +87,8 @@ struct Attempt {
         images = std::make_shared<WorkingImages>(with_mirrored_sources(*all));
         if (plan.options.source_camera)
             plan.options.source_camera = base.options.source_camera->flipped();
+        if (plan.options.source_lens)
+            plan.options.source_lens = base.options.source_lens->flipped();
         if (given) initial = with_flipped_source(*given);
     }
 

@@ -19,6 +19,12 @@ Pinhole camera_guess(const ImageView& image, double hfov) {
     return Pinhole::from_hfov(image.width, image.height, hfov);
 }
 
+// The same camera with a lens that is given; none given, with its own.
+Pinhole with_lens(Pinhole camera, const std::optional<Lens>& lens) {
+    if (lens) camera.lens = *lens;
+    return camera;
+}
+
 // What candidates are compared by: how well edges agree beyond chance, and over how much of the
 // image. Chance grows as the overlap shrinks. `value`: a NecValue or a LevelReport.
 template <class Value>
@@ -28,7 +34,7 @@ double merit(const Value& value) {
 
 // Where the field of view of the reference makes little difference, it is the paper's 45 deg.
 double preference(const Rig& rig) {
-    const double ratio = std::log(rig.reference.field().width() / (2 * std::tan(22.5 * kDegree)));
+    const double ratio = std::log(rig.reference.width_by_focal() / (2 * std::tan(22.5 * kDegree)));
     return 1 - 0.12 * std::abs(ratio);
 }
 
@@ -143,7 +149,7 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal, co
                 [&](int i) {
                     const double focal = paper * std::pow(1.2, i - 5);
                     return with_reference_focal(from, mount,
-                                                focal * from.reference.field().width());
+                                                focal * from.reference.width_by_focal());
                 },
                 candidate);
         }
@@ -194,30 +200,35 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
     } else if (initial) {
         cameras = {initial->reference};
     } else if (options.reference_hfov_deg) {
-        cameras = {camera_guess(reference, *options.reference_hfov_deg * kDegree)};
+        cameras = {Pinhole::from_hfov(reference.width, reference.height,
+                                      *options.reference_hfov_deg * kDegree,
+                                      options.reference_lens.value_or(Lens()))};
     } else {
         for (double hfov : {60.0, 40.0, 82.0})
             cameras.push_back(camera_guess(reference, hfov * kDegree));
     }
+    for (Pinhole& camera : cameras) camera = with_lens(camera, options.reference_lens);
     for (const Pinhole& camera : cameras) {
         SearchHypothesis hypothesis{camera, {}};
         if (options.source_camera) {
             hypothesis.sources = {*options.source_camera};
         } else {
-            // Fields of view are compared by their tangents, as focal lengths are.
+            // Fields of view are compared by their tangents, as focal lengths are, lenses aside.
             const Pinhole& centre = local ? initial->source : camera;
             const double ratio = local ? 1.15 : options.search.max_fov_ratio;
             const double widest = std::tan(60 * kDegree);
             const int steps = static_cast<int>(std::ceil(std::log(ratio) / std::log(scale_step)));
             for (int i = -steps; i <= steps; ++i) {
                 const double scale = std::pow(ratio, static_cast<double>(i) / steps);
-                const double tangent = scale * std::tan(centre.hfov() / 2);
+                const double tangent = scale * centre.width_by_focal() / 2;
                 if (tangent > widest) continue;
                 Pinhole guess = camera_guess(source, 2 * std::atan(tangent));
+                if (initial) guess.lens = initial->source.lens;
                 if (local) guess = initial->source.zoomed(1 / scale);
                 hypothesis.sources.push_back(guess);
             }
         }
+        for (Pinhole& guess : hypothesis.sources) guess = with_lens(guess, options.source_lens);
         space.hypotheses.push_back(hypothesis);
     }
     const double max_roll = (local ? 3.0 : options.search.max_roll_deg) * kDegree;
@@ -252,11 +263,14 @@ Rig given_start(const ImageView& reference, const ImageView& source,
     if (initial) {
         rig = *initial;
     } else {
-        rig.reference = camera_guess(reference, options.reference_hfov_deg.value_or(45) * kDegree);
+        rig.reference = Pinhole::from_hfov(reference.width, reference.height,
+                                           options.reference_hfov_deg.value_or(45) * kDegree,
+                                           options.reference_lens.value_or(Lens()));
         rig.source = camera_guess(source, 45 * kDegree);
     }
-    rig.reference = options.reference_camera.value_or(rig.reference);
-    rig.source = options.source_camera.value_or(rig.source);
+    rig.reference =
+        with_lens(options.reference_camera.value_or(rig.reference), options.reference_lens);
+    rig.source = with_lens(options.source_camera.value_or(rig.source), options.source_lens);
     return rig;
 }
 

@@ -23,7 +23,7 @@ struct Baseline {
 
 Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
     constexpr int kDirections = 8;
-    const double width = rig.reference.field().width();  // about an angle
+    const double width = rig.reference.width_by_focal();  // about an angle
     std::vector<double> values;
     for (double radius : {0.04, 0.07, 0.10})
         for (int i = 0; i < kDirections; ++i) {

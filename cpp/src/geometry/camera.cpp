@@ -36,12 +36,15 @@ double angle_of(const Lens& lens, const Eigen::Vector2d& shown) {
 
 }  // namespace
 
-Pinhole Pinhole::from_hfov(int width, int height, double hfov) {
+Pinhole Pinhole::from_hfov(int width, int height, double hfov, const Lens& lens) {
     require(hfov > 0 && hfov < kPi, "camera", "hfov", hfov, "an angle in (0, pi) rad");
     Pinhole camera;
     camera.width = width;
     camera.height = height;
-    camera.fx = camera.fy = width / (2 * std::tan(hfov / 2));
+    const auto border = lens.distort({std::tan(hfov / 2), 0});
+    require(border.has_value(), "camera", "hfov", hfov, "an angle in rad that its lens shows");
+    camera.fx = camera.fy = width / (2 * border->norm());
+    camera.lens = lens;
     camera.cx = (width - 1) / 2.0;
     camera.cy = (height - 1) / 2.0;
     return camera;

@@ -3,10 +3,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 
 #include "base/format.hpp"
+#include "xcalib/error.hpp"
 
 namespace xcalib {
 namespace {
@@ -73,6 +75,12 @@ const char* name_of(LensModel model) {
         case LensModel::fisheye: return "fisheye";
     }
     return "";
+}
+
+std::optional<LensModel> lens_model_of(const std::string& name) {
+    for (const LensModel model : {LensModel::none, LensModel::brown, LensModel::fisheye})
+        if (name == name_of(model)) return model;
+    return std::nullopt;
 }
 
 Lens::Lens(LensModel model, const std::vector<double>& coefficients)
@@ -225,6 +233,41 @@ Lens Lens::flipped() const {
     Lens out = *this;  // the radius stays
     out.coefficients_[3] = -coefficients_[3];
     return out;
+}
+
+std::optional<Lens> Lens::parse(const std::string& option, const std::string& word) {
+    if (word == "auto") return std::nullopt;
+    const auto bad = [&](const std::string& why) {
+        return InputError(option + " is '" + word +
+                          "', expected auto, none, brown:K1,K2,P1,P2[,K3[,K4,K5,K6]] or "
+                          "fisheye:K1,K2,K3,K4" +
+                          why);
+    };
+    const std::size_t colon = word.find(':');
+    const std::optional<LensModel> model = lens_model_of(word.substr(0, colon));
+    if (!model || (*model == LensModel::none) != (colon == std::string::npos)) throw bad("");
+    std::vector<double> coefficients;
+    for (const char* at = word.c_str() + std::min(colon, word.size()); *at != '\0';) {
+        char* end = nullptr;
+        const double value = std::strtod(++at, &end);
+        if (end == at || (*end != ',' && *end != '\0') || !std::isfinite(value))
+            throw bad(": finite numbers between commas");
+        coefficients.push_back(value);
+        at = end;
+    }
+    try {
+        return Lens(*model, coefficients);
+    } catch (const std::invalid_argument& error) {
+        throw bad(std::string(": ") + error.what());
+    }
+}
+
+std::string Lens::word(const std::optional<Lens>& lens) {
+    if (!lens) return "auto";
+    std::string word = name_of(lens->model_);
+    for (std::size_t i = 0; i < lens->count_; ++i)
+        word += format("%s%.10g", i == 0 ? ":" : ",", lens->coefficients_[i]);
+    return word;
 }
 
 bool Lens::operator==(const Lens& other) const {

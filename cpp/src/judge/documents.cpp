@@ -47,15 +47,19 @@ Json json_of(const CalibrationTimes& t) {
 }
 
 Json json_of(const Pinhole& camera) {
-    return {{"width", camera.width},
-            {"height", camera.height},
-            {"fx", camera.fx},
-            {"fy", camera.fy},
-            {"cx", camera.cx},
-            {"cy", camera.cy},
-            {"skew", camera.skew},
-            {"hfov_deg", camera.hfov() / kDegree},
-            {"vfov_deg", camera.vfov() / kDegree}};
+    Json out{{"width", camera.width},
+             {"height", camera.height},
+             {"fx", camera.fx},
+             {"fy", camera.fy},
+             {"cx", camera.cx},
+             {"cy", camera.cy},
+             {"skew", camera.skew},
+             {"hfov_deg", camera.hfov() / kDegree},
+             {"vfov_deg", camera.vfov() / kDegree}};
+    if (camera.lens.model() != LensModel::none)
+        out["lens"] = {{"model", name_of(camera.lens.model())},
+                       {"coefficients", camera.lens.coefficients()}};
+    return out;
 }
 
 template <class Value>

@@ -72,6 +72,12 @@ class Section {
         if (!list.IsSequence() || list.size() != count)
             fail(key, list.IsSequence() ? std::to_string(list.size()) + " values" : scalar(list),
                  "a list of " + std::to_string(count) + " numbers");
+        return numbers(key);
+    }
+
+    std::vector<double> numbers(const char* key) const {
+        const YAML::Node list = node_[key];
+        if (!list.IsSequence()) fail(key, scalar(list), "a list of numbers");
         std::vector<double> out;
         for (const YAML::Node& item : list) out.push_back(number(key, item));
         return out;
@@ -101,8 +107,21 @@ class Section {
     YAML::Node node_;
 };
 
+Lens read_lens(const std::string& path, const std::string& name, const YAML::Node& node) {
+    const Section section(path, name, node, {"model", "coefficients"});
+    const std::optional<LensModel> model = lens_model_of(section.text("model"));
+    if (!model) section.fail("model", section.text("model"), "none, brown or fisheye");
+    const std::vector<double> coefficients = section.numbers("coefficients");
+    try {
+        return Lens(*model, coefficients);
+    } catch (const std::invalid_argument& error) {
+        reject(path, name + ": " + error.what());
+    }
+}
+
 Pinhole read_camera(const std::string& path, const char* name, const YAML::Node& node) {
-    const Section section(path, name, node, {"width", "height", "fx", "fy", "cx", "cy", "skew"});
+    const Section section(path, name, node, {"width", "height", "fx", "fy", "cx", "cy", "skew"},
+                          {"lens"});
     Pinhole camera;
     camera.width = section.size("width");
     camera.height = section.size("height");
@@ -111,6 +130,8 @@ Pinhole read_camera(const std::string& path, const char* name, const YAML::Node&
     camera.cx = section.number("cx");
     camera.cy = section.number("cy");
     camera.skew = section.number("skew");
+    if (const YAML::Node lens = section.node("lens"))
+        camera.lens = read_lens(path, std::string(name) + ".lens", lens);
     return camera;
 }
 
@@ -123,6 +144,19 @@ void write_camera(std::ostream& out, const char* name, const Pinhole& camera) {
         << "  cx: " << text_of(camera.cx) << "\n"
         << "  cy: " << text_of(camera.cy) << "\n"
         << "  skew: " << text_of(camera.skew) << "\n";
+    if (camera.lens.model() == LensModel::none) return;
+    out << "  lens:\n    model: " << name_of(camera.lens.model()) << "\n    coefficients: [";
+    const char* before = "";
+    for (const double value : camera.lens.coefficients()) {
+        out << before << text_of(value);
+        before = ", ";
+    }
+    out << "]\n";
+}
+
+bool needs_version_2(const Rig& rig) {
+    return rig.source_mirrored || rig.reference.lens.model() != LensModel::none ||
+           rig.source.lens.model() != LensModel::none;
 }
 
 Rig parse_rig(const std::string& path, const YAML::Node& root) {
@@ -181,7 +215,7 @@ void save_rig(const Rig& rig, const std::string& path) {
     std::ostringstream out;
     out.imbue(std::locale::classic());
     // Software from before version 2 reads what needs nothing of it.
-    out << "format: xcalib-rig\nversion: " << (rig.source_mirrored ? 2 : 1) << "\n";
+    out << "format: xcalib-rig\nversion: " << (needs_version_2(rig) ? 2 : 1) << "\n";
     write_camera(out, "reference", rig.reference);
     write_camera(out, "source", rig.source);
     out << "source_from_reference:\n"

@@ -31,6 +31,8 @@ void CalibrationOptions::validate() const {
                 *reference_hfov_deg, "an angle in (0, 180) deg");
     if (reference_camera) reference_camera->validate("options: reference_camera");
     if (source_camera) source_camera->validate("options: source_camera");
+    if (reference_lens) reference_lens->validate("options: reference_lens");
+    if (source_lens) source_lens->validate("options: source_lens");
     require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
             search.max_fov_ratio, "a ratio in (1, 10]");
     require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",
