@@ -31,6 +31,14 @@ struct CandidateReport {
     Rig refined;                                           // after refinement at the coarse level
 };
 
+// What k1 and k2 of the source are worth.
+struct LensReport {
+    bool tried = false, kept = false;
+    double k1 = 0.0, k2 = 0.0;
+    // Of the NEC of frames that the fit has not seen: the mean, and its standard deviation.
+    double gain = 0.0, gain_deviation = 0.0;
+};
+
 // A step of Adam, before it is taken: means over its batch.
 struct AdamStep {
     double learning_rate = 0.0;
@@ -55,6 +63,7 @@ struct CalibrationReport {
     std::vector<int> frames;  // indices of the pairs used
     std::vector<CandidateReport> candidates;
     std::vector<LevelReport> levels;
+    LensReport lens;
     std::vector<AdamStep> steps;  // of Solver::adam
 
     std::string brief() const;  // one line

@@ -9,6 +9,7 @@
 #include "base/parallel.hpp"
 #include "calibrate/adam.hpp"
 #include "calibrate/find_mounts.hpp"
+#include "calibrate/fit_lens.hpp"
 #include "calibrate/relative_depth.hpp"
 #include "calibrate/start.hpp"
 #include "calibrate/study.hpp"
@@ -45,9 +46,10 @@ void validate(const std::vector<ImageView>& references, const std::vector<ImageV
     }
 }
 
-// Levenberg-Marquardt on all frames, from the level at which the start was found on some of them.
-void refine(const WorkingImages& images, const Start& found, const Plan& plan,
-            const Progress& notify, CalibrationResult& result) {
+// Levenberg-Marquardt on all frames, from the level at which the start was found on some of them. A
+// lens that is kept on the way moves from there on.
+void refine(const WorkingImages& images, const Start& found, Plan& plan, const Progress& notify,
+            CalibrationResult& result) {
     CalibrationReport& report = result.report;
     const int num_threads = plan.options.num_threads;
     report.candidates = found.candidates;
@@ -67,6 +69,11 @@ void refine(const WorkingImages& images, const Start& found, const Plan& plan,
         if (limit == 0) limit = share_limit(pooled(level, result.rig, num_threads).valid_share);
         report.levels.push_back(solve_stage(images, level, steps[s].stage, limit,
                                             tolerance(steps[s].factor), plan, result.rig));
+        // One level is left to solve, if there are so many, with what was found.
+        if (plan.estimates_lens && steps[s].factor <= kLensFactor && !report.lens.tried) {
+            report.lens = fit_lens(level, limit, tolerance(steps[s].factor), plan, result.rig);
+            plan.frees_lens = report.lens.kept;
+        }
         notify("refine",
                0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
     }

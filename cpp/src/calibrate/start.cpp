@@ -177,6 +177,31 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal, co
     }
 }
 
+// The same rig with k1 in its source's lens: what lies half-way to the sides of the image stays.
+Rig with_k1(const Rig& rig, double k1) {
+    const double shown = 0.3 * rig.source.field().width();
+    const double radius =
+        rig.source.lens.undistort({shown, 0}).value_or(Eigen::Vector2d(shown, 0)).x();
+    Rig out = rig;
+    out.source.lens = k1 == 0 ? Lens() : Lens(LensModel::brown, {k1, 0, 0, 0});
+    out.source = out.source.zoomed(shown / (radius * (1 + k1 * radius * radius)));
+    return out;
+}
+
+// A pinhole hardly finds what a strong lens shows: a few are tried.
+void try_lenses(const Level& level, const Plan& plan, Candidate& candidate) {
+    if (!plan.estimates_lens) return;
+    constexpr double kStep = -0.1, kCost = 0.1;
+    constexpr int kCount = 5;
+    const Rig from = candidate.rig;
+    std::vector<double> merits(kCount);
+    parallel_each(kCount, plan.options.num_threads, [&](int i) {
+        merits[i] = (1 + kCost * kStep * i) * merit(pooled(level, with_k1(from, kStep * i), 1));
+    });
+    const auto best = std::max_element(merits.begin(), merits.end()) - merits.begin();
+    candidate.rig = with_k1(from, kStep * static_cast<double>(best));
+}
+
 // Keeps the best `count`, best first.
 void keep_best(std::vector<Candidate>& candidates, std::size_t count) {
     std::stable_sort(candidates.begin(), candidates.end(),
@@ -345,6 +370,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
             keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
+            if (plan.searches && steps[s].factor >= kCoarse && steps[s].stage == 2)
+                try_lenses(level, plan, candidate);
             candidate.levels.push_back(
                 plan.searches && plan.parts.images
                     ? solve_level(level, {}, steps[s].stage, candidate.share_limit, kTolerance,

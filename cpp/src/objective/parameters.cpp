@@ -1,6 +1,8 @@
 #include "xcalib/parameters.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace xcalib {
 namespace {
@@ -51,7 +53,24 @@ SolverParameters::Camera solver_from_pinhole(const Pinhole& camera) {
             {camera.skew / camera.width}};
 }
 
+// k1 and k2, and the lens that has these instead; what is none stays none where they are 0.
+void read_lens(const Lens& lens, double (&k)[2]) {
+    for (int i = 0; i < 2; ++i) k[i] = has_lens_parameters(lens) ? lens.coefficient(i) : 0.0;
+}
+Lens lens_with(const Lens& rest, const double (&k)[2]) {
+    if (!has_lens_parameters(rest) || (!rest.bends() && k[0] == 0 && k[1] == 0)) return rest;
+    std::vector<double> coefficients = rest.coefficients();
+    coefficients.resize(std::max<std::size_t>(coefficients.size(), 4));
+    std::copy_n(k, 2, coefficients.begin());
+    return {LensModel::brown, coefficients};
+}
+
 }  // namespace
+
+bool has_lens_parameters(const Lens& lens) {
+    return lens.model() == LensModel::none ||
+           (lens.model() == LensModel::brown && !lens.is_rational());
+}
 
 Rig rig_from_paper(const PaperParameters& parameters, const Rig& rest) {
     const Eigen::Vector4d q = parameters.quaternion.normalized();
@@ -62,6 +81,7 @@ Rig rig_from_paper(const PaperParameters& parameters, const Rig& rest) {
     constexpr double kScale = kPaperTranslationScale;
     rig.source_from_reference.translation =
         parameters.translation * Eigen::Vector3d(1, kScale, kScale * kScale);
+    rig.source.lens = lens_with(rest.source.lens, parameters.source_lens);
     return rig;
 }
 
@@ -72,15 +92,19 @@ PaperParameters paper_from_rig(const Rig& rig) {
     parameters.source = paper_from_pinhole(rig.source);
     parameters.quaternion = {q.w(), q.x(), q.y(), q.z()};
     parameters.translation.col(0) = rig.t();
+    read_lens(rig.source.lens, parameters.source_lens);
     return parameters;
 }
 
 SolverParameters solver_from_rig(const Rig& rig) {
     const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
-    return {solver_from_pinhole(rig.reference),
-            solver_from_pinhole(rig.source),
-            {q.w(), q.x(), q.y(), q.z()},
-            {rig.t().x(), rig.t().y(), rig.t().z()}};
+    SolverParameters parameters{solver_from_pinhole(rig.reference),
+                                solver_from_pinhole(rig.source),
+                                {q.w(), q.x(), q.y(), q.z()},
+                                {rig.t().x(), rig.t().y(), rig.t().z()},
+                                {0, 0}};
+    read_lens(rig.source.lens, parameters.source_lens);
+    return parameters;
 }
 
 Rig rig_from_solver(const SolverParameters& parameters, const Rig& rest) {
@@ -91,6 +115,7 @@ Rig rig_from_solver(const SolverParameters& parameters, const Rig& rest) {
     rig.source = pinhole_from_solver(parameters.source, rest.source);
     rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
     rig.source_from_reference.translation = Eigen::Vector3d(t[0], t[1], t[2]);
+    rig.source.lens = lens_with(rest.source.lens, parameters.source_lens);
     return rig;
 }
 

@@ -18,7 +18,8 @@ class ProjectionDerivative {
         : R_(rig.R().cast<float>()), reference_(rig.reference),
           fx_(static_cast<float>(rig.source_K()(0, 0))), fy_(static_cast<float>(rig.source.fy)),
           skew_(static_cast<float>(rig.source.skew)), width_(static_cast<float>(rig.source.width)),
-          height_(static_cast<float>(rig.source.height)) {}
+          height_(static_cast<float>(rig.source.height)),
+          lens_(has_lens_parameters(rig.source.lens) ? 1.0f : 0.0f) {}
 
     // df/du and df/dv, and from them df/dX_S.
     struct Slope {
@@ -59,7 +60,11 @@ class ProjectionDerivative {
         if constexpr (kParameter == kTranslationX) return s.qx;
         if constexpr (kParameter == kTranslationY) return s.qy;
         if constexpr (kParameter == kTranslationZ) return s.qz;
-        if constexpr (kParameter >= kReferenceLogFx) {
+        if constexpr (kParameter == kSourceK1 || kParameter == kSourceK2) {
+            const float r2 = p.x * p.x + p.y * p.y;
+            const float by = lens_ * (kParameter == kSourceK1 ? r2 : r2 * r2);
+            return by * (s.du * fx_ * p.x + (s.du * skew_ + s.dv * fy_) * p.y);
+        } else if constexpr (kParameter >= kReferenceLogFx) {
             const float fx = static_cast<float>(reference_.fx);
             const float fy = static_cast<float>(reference_.fy);
             const float skew = static_cast<float>(reference_.skew);
@@ -107,6 +112,7 @@ class ProjectionDerivative {
     Eigen::Matrix3f R_;
     Pinhole reference_;
     float fx_, fy_, skew_, width_, height_;
+    float lens_;  // 1 where k1 and k2 are parameters, else 0
 };
 
 // dT/dp at one reference pixel, (2 x kNumParameters) [px per unit parameter].

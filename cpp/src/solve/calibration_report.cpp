@@ -38,6 +38,10 @@ std::string CalibrationReport::full() const {
             format("1/%-3d  %5d  %4d x %-4d  %9d  %.5f -> %.5f  %.4f  %4.0f %%  %9.1e  %3.1f  %s\n",
                    l.factor, l.stage, l.width, l.height, l.iterations, l.initial_cost, l.final_cost,
                    l.nec, 100 * l.valid_share, l.condition_number, l.seconds, l.stopped.c_str());
+    if (lens.tried)
+        text += format(
+            "lens of the source: k1 %.3f, k2 %.3f, %s: unseen frames gain %.4f +- %.4f NEC\n",
+            lens.k1, lens.k2, lens.kept ? "kept" : "not kept", lens.gain, lens.gain_deviation);
     return text;
 }
 

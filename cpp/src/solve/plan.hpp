@@ -32,6 +32,8 @@ struct Plan {
     // All frames are solved from the coarsest level on, since flow reaches further the coarser the
     // level is; else from the level at which the start was found.
     bool from_coarsest;
+    bool estimates_lens;      // is a lens of the source tried?
+    bool frees_lens = false;  // k1 and k2 of the source move from 0, in stage 2 at the finer levels
 };
 
 }  // namespace xcalib

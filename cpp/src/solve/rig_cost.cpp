@@ -13,11 +13,11 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 struct Block {
     int first, tangent, ambient;
 };
-constexpr Block kBlocks[] = {{kSourceLogFx, 2, 2}, {kSourceCx, 2, 2},     {kSourceSkew, 1, 1},
-                             {kRotationX, 3, 4},   {kTranslationX, 3, 3}, {kReferenceLogFx, 2, 2},
-                             {kReferenceCx, 2, 2}, {kReferenceSkew, 1, 1}};
+constexpr Block kBlocks[] = {{kSourceLogFx, 2, 2}, {kSourceCx, 2, 2},      {kSourceSkew, 1, 1},
+                             {kRotationX, 3, 4},   {kTranslationX, 3, 3},  {kReferenceLogFx, 2, 2},
+                             {kReferenceCx, 2, 2}, {kReferenceSkew, 1, 1}, {kSourceK1, 2, 2}};
 constexpr int kRotationBlock = 3;
-constexpr int kNumBlocks = 8;
+constexpr int kNumBlocks = 9;
 
 }  // namespace
 
@@ -56,8 +56,9 @@ RigCost::RigCost(const Rig& sizes, const Parameters& free) : rest_(sizes), free_
 }
 
 std::vector<double*> RigCost::blocks(SolverParameters& p) {
-    return {p.source.log_f, p.source.center,   p.source.skew_share, p.quaternion,
-            p.translation,  p.reference.log_f, p.reference.center,  p.reference.skew_share};
+    return {p.source.log_f,     p.source.center,        p.source.skew_share,
+            p.quaternion,       p.translation,          p.reference.log_f,
+            p.reference.center, p.reference.skew_share, p.source_lens};
 }
 
 bool RigCost::Evaluate(double const* const* parameters, double* residuals,

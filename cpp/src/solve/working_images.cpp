@@ -260,4 +260,19 @@ Level make_level(const WorkingImages& images, int factor, const Rig& rig, int nu
     return level;
 }
 
+Level half_of(const Level& level, std::size_t first) {
+    Level half = level;
+    half.pairs.clear();
+    half.weights.clear();
+    double sum = 0;
+    for (std::size_t i = first; i < level.pairs.size(); i += 2) {
+        half.pairs.push_back(level.pairs[i]);
+        half.weights.push_back(level.weights[i]);
+        sum += level.weights[i];
+    }
+    for (double& weight : half.weights)
+        weight = sum > 0 ? weight / sum : 1.0 / static_cast<double>(half.pairs.size());
+    return half;
+}
+
 }  // namespace xcalib

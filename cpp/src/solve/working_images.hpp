@@ -66,6 +66,8 @@ struct Level {
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 // Its sizes only, for sources no finer than the reference.
 Level make_sizes(const WorkingImages& images, int factor, const Rig& rig);
+// Every second pair of a level.
+Level half_of(const Level& level, std::size_t first);
 // The same with the NEC at any factor.
 Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 
