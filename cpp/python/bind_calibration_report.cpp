@@ -41,6 +41,18 @@ void bind_candidate_report(py::module_& m) {
         .def_readonly("refined", &CandidateReport::refined, "Rig, after the coarse levels.");
 }
 
+void bind_lens_report(py::module_& m) {
+    py::class_<LensReport>(m, "LensReport", "What k1 and k2 of the source's lens are worth.")
+        .def_readonly("tried", &LensReport::tried, "Was a lens fitted?")
+        .def_readonly("kept", &LensReport::kept, "Does the rig have it?")
+        .def_readonly("k1", &LensReport::k1, "k1 of a brown, as fitted to all frames.")
+        .def_readonly("k2", &LensReport::k2, "k2 likewise.")
+        .def_readonly("gain", &LensReport::gain,
+                      "In NEC, of frames that the fit has not seen: the mean.")
+        .def_readonly("gain_deviation", &LensReport::gain_deviation,
+                      "The standard deviation of that mean; 0 where nothing was gained at all.");
+}
+
 void bind_adam_step(py::module_& m) {
     py::class_<AdamStep>(m, "AdamStep", "Before a step of Adam is taken: means over its batch.")
         .def_readonly("learning_rate", &AdamStep::learning_rate, "Learning rate of the step.")
@@ -55,6 +67,7 @@ void bind_adam_step(py::module_& m) {
 void bind_calibration_report(py::module_& m) {
     bind_level_report(m);
     bind_candidate_report(m);
+    bind_lens_report(m);
     bind_adam_step(m);
     py::class_<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
@@ -88,6 +101,7 @@ void bind_calibration_report(py::module_& m) {
         .def_readonly("candidates", &CalibrationReport::candidates,
                       "Candidates of the search, best score first.")
         .def_readonly("levels", &CalibrationReport::levels, "In the order solved.")
+        .def_readonly("lens", &CalibrationReport::lens, "LensReport, of solver 'ceres'.")
         .def_readonly("steps", &CalibrationReport::steps, "AdamStep, of solver 'adam'.")
         .def("brief", &CalibrationReport::brief, "One line.")
         .def("full", &CalibrationReport::full, "A table.")

@@ -314,6 +314,27 @@ class CandidateReport:
     def refined(self) -> Rig:
         """Rig, after the coarse levels."""
 
+class LensReport:
+    """What k1 and k2 of the source's lens are worth."""
+    @property
+    def tried(self) -> bool:
+        """Was a lens fitted?"""
+    @property
+    def kept(self) -> bool:
+        """Does the rig have it?"""
+    @property
+    def k1(self) -> float:
+        """k1 of a brown, as fitted to all frames."""
+    @property
+    def k2(self) -> float:
+        """k2 likewise."""
+    @property
+    def gain(self) -> float:
+        """In NEC, of frames that the fit has not seen: the mean."""
+    @property
+    def gain_deviation(self) -> float:
+        """The standard deviation of that mean; 0 where nothing was gained at all."""
+
 class AdamStep:
     """Before a step of Adam is taken: means over its batch."""
     @property
@@ -386,6 +407,9 @@ class CalibrationReport:
     @property
     def levels(self) -> list[LevelReport]:
         """In the order solved."""
+    @property
+    def lens(self) -> LensReport:
+        """LensReport, of solver 'ceres'."""
     @property
     def steps(self) -> list[AdamStep]:
         """AdamStep, of solver 'adam'."""

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "base/format.hpp"
 #include "base/parallel.hpp"
 #include "calibrate/adam.hpp"
 #include "calibrate/find_mounts.hpp"
@@ -135,6 +136,9 @@ void settle(Attempt& attempt, CalibrationResult& result) {
     result.rig = attempt.given(result.rig);
     const std::string mount = Mount::of(result.rig).text();
     if (mount != Mount{}.text()) report.message += "; the source image is " + mount;
+    if (report.lens.kept)
+        report.message +=
+            format("; the source's lens bends: k1 %.3f, k2 %.3f", report.lens.k1, report.lens.k2);
     for (CandidateReport& candidate : report.candidates) {
         candidate.found = attempt.given(candidate.found);
         candidate.refined = attempt.given(candidate.refined);

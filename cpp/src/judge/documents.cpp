@@ -33,6 +33,15 @@ Json json_of(const LevelReport& l) {
             {"stopped", l.stopped}};
 }
 
+Json json_of(const LensReport& l) {
+    return {{"tried", l.tried},
+            {"kept", l.kept},
+            {"k1", l.k1},
+            {"k2", l.k2},
+            {"gain", l.gain},
+            {"gain_deviation", l.gain_deviation}};
+}
+
 Json json_of(const AdamStep& s) {
     return {{"learning_rate", s.learning_rate},
             {"image", s.image},
@@ -98,6 +107,7 @@ Json json_of(const CalibrationReport& report) {
             {"frames", report.frames},
             {"candidates", list_of(report.candidates)},
             {"levels", list_of(report.levels)},
+            {"lens", json_of(report.lens)},
             {"steps", list_of(report.steps)}};
 }
 
