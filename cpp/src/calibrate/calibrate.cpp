@@ -181,7 +181,8 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     const Progress notify = [&](const std::string& stage, double share) {
         if (progress) progress(stage, share);
     };
-    const Plan plan(options, flow, parts);
+    Plan plan(options, flow, parts);
+    if (initial && initial->source.lens.bends()) plan.estimates_lens = false;  // it is known
     validate(references, sources, depths, initial, options);
 
     const WorkersOfThread workers(resolve_threads(options.num_threads));
