@@ -44,13 +44,14 @@ void bind_candidate_report(py::module_& m) {
 void bind_lens_report(py::module_& m) {
     py::class_<LensReport>(m, "LensReport", "What k1 and k2 of the source's lens are worth.")
         .def_readonly("tried", &LensReport::tried, "Was a lens fitted?")
-        .def_readonly("kept", &LensReport::kept, "Does the rig have it?")
-        .def_readonly("k1", &LensReport::k1, "k1 of a brown, as fitted to all frames.")
-        .def_readonly("k2", &LensReport::k2, "k2 likewise.")
-        .def_readonly("gain", &LensReport::gain,
-                      "In NEC, of frames that the fit has not seen: the mean.")
+        .def_readonly("coefficients", &LensReport::coefficients,
+                      "Kept: 0, 1 (k1) or 2 (k1 and k2).")
+        .def_readonly(
+            "gain", &LensReport::gain,
+            "In NEC by the last one that was tried, of frames that the fit has not seen:\n"
+            "the mean; of all frames where they gain too little to look further.")
         .def_readonly("gain_deviation", &LensReport::gain_deviation,
-                      "The standard deviation of that mean; 0 where nothing was gained at all.");
+                      "The standard deviation of that mean; 0 of all frames.");
 }
 
 void bind_adam_step(py::module_& m) {

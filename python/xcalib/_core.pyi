@@ -320,20 +320,15 @@ class LensReport:
     def tried(self) -> bool:
         """Was a lens fitted?"""
     @property
-    def kept(self) -> bool:
-        """Does the rig have it?"""
-    @property
-    def k1(self) -> float:
-        """k1 of a brown, as fitted to all frames."""
-    @property
-    def k2(self) -> float:
-        """k2 likewise."""
+    def coefficients(self) -> int:
+        """Kept: 0, 1 (k1) or 2 (k1 and k2)."""
     @property
     def gain(self) -> float:
-        """In NEC, of frames that the fit has not seen: the mean."""
+        """In NEC by the last one that was tried, of frames that the fit has not seen:
+        the mean; of all frames where they gain too little to look further."""
     @property
     def gain_deviation(self) -> float:
-        """The standard deviation of that mean; 0 where nothing was gained at all."""
+        """The standard deviation of that mean; 0 of all frames."""
 
 class AdamStep:
     """Before a step of Adam is taken: means over its batch."""

@@ -33,9 +33,10 @@ struct CandidateReport {
 
 // What k1 and k2 of the source are worth.
 struct LensReport {
-    bool tried = false, kept = false;
-    double k1 = 0.0, k2 = 0.0;
-    // Of the NEC of frames that the fit has not seen: the mean, and its standard deviation.
+    bool tried = false;
+    int coefficients = 0;  // that are kept: none, k1, or k1 and k2
+    // In NEC by the last one that was tried, of frames that the fit has not seen: the mean, and its
+    // standard deviation; of all frames where they gain too little to look further.
     double gain = 0.0, gain_deviation = 0.0;
 };
 

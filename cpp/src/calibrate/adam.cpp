@@ -69,7 +69,7 @@ std::vector<bool> frozen(int stage, const Plan& plan) {
         for (int axis = 0; axis < 3; ++axis)
             held[kPaperTranslation + 3 * scale + axis] =
                 scale >= options.adam.translation_scales || (stage == 1 && axis == 2);
-    for (int i = 0; i < 2; ++i) held[kPaperLens + i] = stage == 1 || !plan.frees_lens;
+    for (int i = 0; i < 2; ++i) held[kPaperLens + i] = stage == 1 || i >= plan.lens_coefficients;
     return held;
 }
 

@@ -73,7 +73,7 @@ void refine(const WorkingImages& images, const Start& found, Plan& plan, const P
         // One level is left to solve, if there are so many, with what was found.
         if (plan.estimates_lens && steps[s].factor <= kLensFactor && !report.lens.tried) {
             report.lens = fit_lens(level, limit, tolerance(steps[s].factor), plan, result.rig);
-            plan.frees_lens = report.lens.kept;
+            plan.lens_coefficients = report.lens.coefficients;
         }
         notify("refine",
                0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
@@ -136,9 +136,9 @@ void settle(Attempt& attempt, CalibrationResult& result) {
     result.rig = attempt.given(result.rig);
     const std::string mount = Mount::of(result.rig).text();
     if (mount != Mount{}.text()) report.message += "; the source image is " + mount;
-    if (report.lens.kept)
-        report.message +=
-            format("; the source's lens bends: k1 %.3f, k2 %.3f", report.lens.k1, report.lens.k2);
+    if (const Lens& lens = result.rig.source.lens; report.lens.coefficients > 0)
+        report.message += format("; the source's lens bends: k1 %.3f, k2 %.3f", lens.coefficient(0),
+                                 lens.coefficient(1));
     for (CandidateReport& candidate : report.candidates) {
         candidate.found = attempt.given(candidate.found);
         candidate.refined = attempt.given(candidate.refined);

@@ -9,57 +9,77 @@
 namespace xcalib {
 namespace {
 
-// What frames gain from one rig to another, each by its NEC.
-void add_gains(const Level& unseen, const Rig& from, const Rig& to, std::vector<double>& gains) {
-    const Rig before = unseen.rig_at(from), after = unseen.rig_at(to);
-    for (const auto& pair : unseen.pairs)
-        gains.push_back(pair->evaluate(after).nec - pair->evaluate(before).nec);
+// Smaller gains in NEC are not worth a lens; nor are those of fewer of their own deviations.
+constexpr double kGain = 1e-3, kDeviations = 3.0;
+constexpr std::size_t kPairs = 4;  // fewer show no deviation
+
+struct Gain {
+    double mean, deviation;  // of the mean
+    bool counts() const { return mean > kGain && mean > kDeviations * deviation; }
+};
+
+// What frames gain from `simple`, which has seen them, to what `plan` makes of `rich` without them.
+Gain unseen_gain(const Level& level, double share_limit, const Plan& plan, const Rig& simple,
+                 const Rig& rich) {
+    constexpr double kTolerance = 1e-4;
+    std::vector<double> gains;
+    for (std::size_t k = 0; k < 2; ++k) {
+        const Level unseen = half_of(level, 1 - k);
+        Rig fitted = rich;
+        solve_level(half_of(level, k), {}, 2, share_limit, kTolerance, plan, rich, fitted);
+        const Rig before = unseen.rig_at(simple), after = unseen.rig_at(fitted);
+        for (const auto& pair : unseen.pairs)
+            gains.push_back(pair->evaluate(after).nec - pair->evaluate(before).nec);
+    }
+    const double count = static_cast<double>(gains.size());
+    double mean = 0, squares = 0;
+    for (const double gain : gains) mean += gain / count;
+    for (const double gain : gains) squares += (gain - mean) * (gain - mean);
+    return {mean, std::sqrt(squares / (count - 1) / count)};
 }
 
 }  // namespace
 
 LensReport fit_lens(const Level& level, double share_limit, double tolerance, const Plan& plan,
                     Rig& rig) {
-    // Gains as small as that no lens is needed for; and so many of their own deviations.
-    constexpr double kGain = 1e-3, kDeviations = 3.0;
-    constexpr std::size_t kPairs = 4;  // fewer show no deviation
-    constexpr double kHalfTolerance = 1e-4;
     LensReport report;
     if (level.pairs.size() < kPairs) return report;
     report.tried = true;
-    Plan bent = plan;
-    bent.frees_lens = true;
     const int num_threads = plan.options.num_threads;
-    Rig lens = rig;
-    if (rig.source.lens.bends()) {
-        rig.source.lens = Lens();
-        solve_level(level, {}, 2, share_limit, tolerance, plan, rig, rig);
-    } else {
-        solve_level(level, {}, 2, share_limit, tolerance, bent, rig, lens);
-    }
-    const double straight_nec = pooled(level, rig, num_threads).nec;
-    const double bent_nec = pooled(level, lens, num_threads).nec;
-    report.k1 = lens.source.lens.coefficient(0);
-    report.k2 = lens.source.lens.coefficient(1);
-    report.gain = bent_nec - straight_nec;
-    if (report.gain < kGain) return report;
 
-    std::vector<double> gains;
-    for (std::size_t k = 0; k < 2; ++k) {
-        const Level seen = half_of(level, k), unseen = half_of(level, 1 - k);
-        Rig without = rig, with = lens;
-        solve_level(seen, {}, 2, share_limit, kHalfTolerance, plan, without, without);
-        solve_level(seen, {}, 2, share_limit, kHalfTolerance, bent, with, with);
-        add_gains(unseen, without, with, gains);
+    // By how many coefficients they have; each is worth looking at where all frames gain.
+    std::vector<Rig> fits;
+    std::vector<Plan> plans;
+    std::vector<double> necs;
+    const auto solve = [&](int coefficients, const Rig& from) {
+        plans.push_back(plan);
+        plans.back().lens_coefficients = coefficients;
+        fits.push_back(from);
+        if (coefficients == 0) fits[0].source.lens = Lens();
+        // It was solved as it came.
+        if (coefficients != (rig.source.lens.bends() ? 1 : 0))
+            solve_level(level, {}, 2, share_limit, tolerance, plans.back(), fits.back(),
+                        fits.back());
+        necs.push_back(pooled(level, fits.back(), num_threads).nec);
+    };
+    solve(0, rig);
+    solve(1, rig);
+    report.gain = necs[1] - necs[0];
+    if (report.gain > kGain) solve(2, fits[1]);
+    while (fits.size() > 1 && necs.back() - necs[fits.size() - 2] <= kGain) {
+        fits.pop_back();
+        necs.pop_back();
     }
-    const double count = static_cast<double>(gains.size());
-    double mean = 0, squares = 0;
-    for (const double gain : gains) mean += gain / count;
-    for (const double gain : gains) squares += (gain - mean) * (gain - mean);
-    report.gain = mean;
-    report.gain_deviation = std::sqrt(squares / (count - 1) / count);
-    report.kept = mean > kGain && mean > kDeviations * report.gain_deviation;
-    if (report.kept) rig = lens;
+    while (fits.size() > 1) {
+        const Gain gain = unseen_gain(level, share_limit, plans[fits.size() - 1],
+                                      fits[fits.size() - 2], fits.back());
+        report.gain = gain.mean;
+        report.gain_deviation = gain.deviation;
+        if (gain.counts()) break;
+        fits.pop_back();
+    }
+    rig = fits.back();
+    report.coefficients = static_cast<int>(fits.size()) - 1;
     return report;
 }
 

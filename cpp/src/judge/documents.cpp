@@ -35,9 +35,7 @@ Json json_of(const LevelReport& l) {
 
 Json json_of(const LensReport& l) {
     return {{"tried", l.tried},
-            {"kept", l.kept},
-            {"k1", l.k1},
-            {"k2", l.k2},
+            {"coefficients", l.coefficients},
             {"gain", l.gain},
             {"gain_deviation", l.gain_deviation}};
 }

@@ -40,8 +40,11 @@ std::string CalibrationReport::full() const {
                    l.nec, 100 * l.valid_share, l.condition_number, l.seconds, l.stopped.c_str());
     if (lens.tried)
         text += format(
-            "lens of the source: k1 %.3f, k2 %.3f, %s: unseen frames gain %.4f +- %.4f NEC\n",
-            lens.k1, lens.k2, lens.kept ? "kept" : "not kept", lens.gain, lens.gain_deviation);
+            "lens of the source: %s; frames gain %.4f +- %.4f NEC by the last coefficient tried\n",
+            lens.coefficients == 0   ? "none"
+            : lens.coefficients == 1 ? "k1"
+                                     : "k1 and k2",
+            lens.gain, lens.gain_deviation);
     return text;
 }
 

@@ -33,7 +33,9 @@ struct Plan {
     // level is; else from the level at which the start was found.
     bool from_coarsest;
     bool estimates_lens;      // is a lens of the source tried?
-    bool frees_lens = false;  // k1 and k2 of the source move from 0, in stage 2 at the finer levels
+    // So many of k1 and k2 of the source move, in stage 2 at the finer levels; k1 in any case where
+    // one that is estimated bends.
+    int lens_coefficients = 0;
 };
 
 }  // namespace xcalib

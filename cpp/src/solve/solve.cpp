@@ -33,22 +33,23 @@ class HoldCost : public ceres::CostFunction {
     std::vector<double> held_;
 };
 
-// Does the source's lens move? Coarse levels hardly see what bends: there, only where the start has
+// How many of k1 and k2 move. Coarse levels hardly see what bends: there, only where the start has
 // some.
-bool lens_is_free(const Plan& plan, int stage, int factor, const Rig& rig) {
-    return stage == 2 && ((plan.frees_lens && factor < kCoarse) ||
-                          (plan.estimates_lens && rig.source.lens.bends()));
+int free_lens_coefficients(const Plan& plan, int stage, int factor, const Rig& rig) {
+    if (stage == 1 || !has_lens_parameters(rig.source.lens)) return 0;
+    if (plan.estimates_lens && rig.source.lens.bends()) return std::max(1, plan.lens_coefficients);
+    return factor < kCoarse ? plan.lens_coefficients : 0;
 }
 
 // What moves in a stage: all but the paper's frozen sets, and what is known.
-Parameters free_parameters(int stage, const CalibrationOptions& options, bool lens_free) {
+Parameters free_parameters(int stage, const CalibrationOptions& options, int lens) {
     const bool source_free = !options.source_camera;
     const bool reference_free = options.optimize_reference && !options.reference_camera;
     Parameters free(0);
     for (int p = 0; p < kNumParameters; ++p) {
         const bool late = p == kRotationZ || p == kTranslationZ || p == kSourceCx ||
                           p == kSourceCy || p == kSourceSkew || p >= kReferenceCx;
-        const bool known = (p <= kSourceSkew && !source_free) || (p >= kSourceK1 && !lens_free) ||
+        const bool known = (p <= kSourceSkew && !source_free) || (p >= kSourceK1 + lens) ||
                            (p >= kReferenceLogFx && p < kSourceK1 && !reference_free);
         if (!known && !(stage == 1 && late)) free.add(p);
     }
@@ -57,7 +58,7 @@ Parameters free_parameters(int stage, const CalibrationOptions& options, bool le
 
 // The same for Ceres.
 void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
-            const CalibrationOptions& options, bool lens_free) {
+            const CalibrationOptions& options, int lens) {
     const bool source_known = options.source_camera.has_value();
     const bool reference_free = options.optimize_reference && !options.reference_camera;
     if (stage == 1) {
@@ -69,7 +70,8 @@ void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
     for (double* block : {p.source.center, p.source.skew_share})
         if (stage == 1 || source_known) problem.SetParameterBlockConstant(block);
     if (source_known) problem.SetParameterBlockConstant(p.source.log_f);
-    if (!lens_free) problem.SetParameterBlockConstant(p.source_lens);
+    if (lens == 0) problem.SetParameterBlockConstant(p.source_lens);
+    if (lens == 1) problem.SetManifold(p.source_lens, new ceres::SubsetManifold(2, {1}));
     for (double* block : {p.reference.log_f, p.reference.center, p.reference.skew_share})
         if (!reference_free || (stage == 1 && block != p.reference.log_f))
             problem.SetParameterBlockConstant(block);
@@ -144,8 +146,8 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     ceres::Problem problem;
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
-    const bool lens_free = lens_is_free(plan, stage, level.factor, rig);
-    const Parameters free = free_parameters(stage, options, lens_free);
+    const int lens = free_lens_coefficients(plan, stage, level.factor, rig);
+    const Parameters free = free_parameters(stage, options, lens);
     for (std::size_t i = 0; i < level.pairs.size() && plan.parts.images; ++i)
         problem.AddResidualBlock(
             new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free), nullptr,
@@ -163,7 +165,7 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
         hold(held.translation, 3, 0.1, p.translation);
         hold(held.quaternion, 4, 0.05, p.quaternion);
     }
-    freeze(problem, p, stage, options, lens_free);
+    freeze(problem, p, stage, options, lens);
 
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_QR;
