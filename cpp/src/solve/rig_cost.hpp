@@ -46,6 +46,17 @@ class RigCost : public ceres::CostFunction {
     mutable CompressedBlock last_;
 };
 
+// Two numbers that move by the same.
+class TogetherManifold : public ceres::Manifold {
+   public:
+    int AmbientSize() const override { return 2; }
+    int TangentSize() const override { return 1; }
+    bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
+    bool PlusJacobian(const double* x, double* jacobian) const override;
+    bool Minus(const double* y, const double* x, double* y_minus_x) const override;
+    bool MinusJacobian(const double* x, double* jacobian) const override;
+};
+
 // A rotation that may pan and tilt but not roll: stage 1 freezes the roll.
 class PanTiltManifold : public ceres::Manifold {
    public:

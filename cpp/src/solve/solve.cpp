@@ -42,7 +42,7 @@ int free_lens_coefficients(const Plan& plan, int stage, int factor, const Rig& r
 }
 
 // What moves in a stage: all but the paper's frozen sets, and what is known.
-Parameters free_parameters(int stage, const CalibrationOptions& options, int lens) {
+Parameters free_parameters(int stage, const CalibrationOptions& options, int lens, bool focal) {
     const bool source_free = !options.source_camera;
     const bool reference_free = options.optimize_reference && !options.reference_camera;
     Parameters free(0);
@@ -50,7 +50,8 @@ Parameters free_parameters(int stage, const CalibrationOptions& options, int len
         const bool late = p == kRotationZ || p == kTranslationZ || p == kSourceCx ||
                           p == kSourceCy || p == kSourceSkew || p >= kReferenceCx;
         const bool known = (p <= kSourceSkew && !source_free) || (p >= kSourceK1 + lens) ||
-                           (p >= kReferenceLogFx && p < kSourceK1 && !reference_free);
+                           (p >= kReferenceLogFx && p < kSourceK1 && !reference_free &&
+                            !(focal && p <= kReferenceLogFy));
         if (!known && !(stage == 1 && late)) free.add(p);
     }
     return free;
@@ -58,7 +59,7 @@ Parameters free_parameters(int stage, const CalibrationOptions& options, int len
 
 // The same for Ceres.
 void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
-            const CalibrationOptions& options, int lens) {
+            const CalibrationOptions& options, int lens, bool focal) {
     const bool source_known = options.source_camera.has_value();
     const bool reference_free = options.optimize_reference && !options.reference_camera;
     if (stage == 1) {
@@ -73,8 +74,11 @@ void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
     if (lens == 0) problem.SetParameterBlockConstant(p.source_lens);
     if (lens == 1) problem.SetManifold(p.source_lens, new ceres::SubsetManifold(2, {1}));
     for (double* block : {p.reference.log_f, p.reference.center, p.reference.skew_share})
-        if (!reference_free || (stage == 1 && block != p.reference.log_f))
-            problem.SetParameterBlockConstant(block);
+        if (!reference_free || (stage == 1 && block != p.reference.log_f)) {
+            if (focal && block == p.reference.log_f)
+                problem.SetManifold(block, new TogetherManifold);
+            else problem.SetParameterBlockConstant(block);
+        }
 }
 
 // Condition number by the free parameters, with columns scaled to unit norm: it shows coupled
@@ -147,7 +151,8 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
     const int lens = free_lens_coefficients(plan, stage, level.factor, rig);
-    const Parameters free = free_parameters(stage, options, lens);
+    const bool focal = lens > 0 && plan.fits_focal;
+    const Parameters free = free_parameters(stage, options, lens, focal);
     for (std::size_t i = 0; i < level.pairs.size() && plan.parts.images; ++i)
         problem.AddResidualBlock(
             new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free), nullptr,
@@ -165,7 +170,7 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
         hold(held.translation, 3, 0.1, p.translation);
         hold(held.quaternion, 4, 0.05, p.quaternion);
     }
-    freeze(problem, p, stage, options, lens);
+    freeze(problem, p, stage, options, lens, focal);
 
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_QR;
