@@ -18,16 +18,25 @@ struct Gain {
     bool counts() const { return mean > kGain && mean > kDeviations * deviation; }
 };
 
-// What frames gain from `simple`, which has seen them, to what `plan` makes of `rich` without them.
-Gain unseen_gain(const Level& level, double share_limit, const Plan& plan, const Rig& simple,
-                 const Rig& rich) {
+// The pairs of a level that are in a fold, or in none but it.
+Level fold_of(const Level& level, std::size_t folds, std::size_t fold, bool inside) {
+    return part_of(level, [&](std::size_t i) { return (i % folds == fold) == inside; });
+}
+
+// What frames gain from `simple` to `rich`, each by fits to other frames that begin there.
+Gain unseen_gain(const Level& level, double share_limit, const Plan& simple_plan,
+                 const Plan& rich_plan, const Rig& simple, const Rig& rich) {
     constexpr double kTolerance = 1e-4;
+    // A fit to half of few frames is poor, whatever the lens.
+    const std::size_t pairs = level.pairs.size();
+    const std::size_t folds = std::min(std::max<std::size_t>(32 / pairs, 2), pairs);
     std::vector<double> gains;
-    for (std::size_t k = 0; k < 2; ++k) {
-        const Level unseen = half_of(level, 1 - k);
-        Rig fitted = rich;
-        solve_level(half_of(level, k), {}, 2, share_limit, kTolerance, plan, rich, fitted);
-        const Rig before = unseen.rig_at(simple), after = unseen.rig_at(fitted);
+    for (std::size_t k = 0; k < folds; ++k) {
+        const Level seen = fold_of(level, folds, k, false), unseen = fold_of(level, folds, k, true);
+        Rig before = simple, after = rich;
+        solve_level(seen, {}, 2, share_limit, kTolerance, simple_plan, simple, before);
+        solve_level(seen, {}, 2, share_limit, kTolerance, rich_plan, rich, after);
+        before = unseen.rig_at(before), after = unseen.rig_at(after);
         for (const auto& pair : unseen.pairs)
             gains.push_back(pair->evaluate(after).nec - pair->evaluate(before).nec);
     }
@@ -71,8 +80,8 @@ LensReport fit_lens(const Level& level, double share_limit, double tolerance, co
         necs.pop_back();
     }
     while (fits.size() > 1) {
-        const Gain gain = unseen_gain(level, share_limit, plans[fits.size() - 1],
-                                      fits[fits.size() - 2], fits.back());
+        const Gain gain = unseen_gain(level, share_limit, plans[fits.size() - 2],
+                                      plans[fits.size() - 1], fits[fits.size() - 2], fits.back());
         report.gain = gain.mean;
         report.gain_deviation = gain.deviation;
         if (gain.counts()) break;

@@ -260,19 +260,24 @@ Level make_level(const WorkingImages& images, int factor, const Rig& rig, int nu
     return level;
 }
 
-Level half_of(const Level& level, std::size_t first) {
-    Level half = level;
-    half.pairs.clear();
-    half.weights.clear();
+Level part_of(const Level& level, const std::function<bool(std::size_t)>& takes) {
+    Level part = level;
+    part.pairs.clear();
+    part.weights.clear();
     double sum = 0;
-    for (std::size_t i = first; i < level.pairs.size(); i += 2) {
-        half.pairs.push_back(level.pairs[i]);
-        half.weights.push_back(level.weights[i]);
+    for (std::size_t i = 0; i < level.pairs.size(); ++i) {
+        if (!takes(i)) continue;
+        part.pairs.push_back(level.pairs[i]);
+        part.weights.push_back(level.weights[i]);
         sum += level.weights[i];
     }
-    for (double& weight : half.weights)
-        weight = sum > 0 ? weight / sum : 1.0 / static_cast<double>(half.pairs.size());
-    return half;
+    for (double& weight : part.weights)
+        weight = sum > 0 ? weight / sum : 1.0 / static_cast<double>(part.pairs.size());
+    return part;
+}
+
+Level half_of(const Level& level, std::size_t first) {
+    return part_of(level, [&](std::size_t i) { return i % 2 == first; });
 }
 
 }  // namespace xcalib

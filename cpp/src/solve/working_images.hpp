@@ -1,6 +1,7 @@
 // The caller's frames as the calibration works on them, and their pyramid.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <vector>
@@ -66,7 +67,9 @@ struct Level {
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 // Its sizes only, for sources no finer than the reference.
 Level make_sizes(const WorkingImages& images, int factor, const Rig& rig);
-// Every second pair of a level.
+// The pairs of these indices of a level.
+Level part_of(const Level& level, const std::function<bool(std::size_t)>& takes);
+// Every second one.
 Level half_of(const Level& level, std::size_t first);
 // The same with the NEC at any factor.
 Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
