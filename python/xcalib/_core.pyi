@@ -17,6 +17,9 @@ class Lens:
 
     def __init__(self, model: str = "none", coefficients: Sequence[float] = []) -> None:
         """x"""
+    @staticmethod
+    def parse(option: str, word: str) -> Lens | None:
+        """x"""
     @property
     def model(self) -> str:
         """x"""
