@@ -10,10 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 import xcalib
+from conftest import run
 from xcalib.reprojection import targets
 from xcalib.synthetic import Street, random_rig
-
-from conftest import run
 
 
 def random_lens(rng: np.random.Generator, kind: str) -> xcalib.Lens:
@@ -86,7 +85,10 @@ def test_lens_is_what_was_given_and_refuses_what_is_none() -> None:
     np.testing.assert_allclose(lens.undistort(lens.distort([[0.4, -0.3]])), [[0.4, -0.3]])
     folded = xcalib.Lens("brown", [-1 / 3, 0, 0, 0])
     assert folded.max_radius == pytest.approx(1)
-    assert np.isnan(folded.distort([[1.01, 0]])).all() and np.isfinite(folded.distort([[0.9, 0]])).all()
+    assert (
+        np.isnan(folded.distort([[1.01, 0]])).all()
+        and np.isfinite(folded.distort([[0.9, 0]])).all()
+    )
     with pytest.raises(ValueError, match="model = 'tele', expected none, brown or fisheye"):
         xcalib.Lens("tele", [])
     with pytest.raises(ValueError, match="brown has 3 coefficients, expected 4"):
@@ -100,7 +102,9 @@ def test_lens_is_what_was_given_and_refuses_what_is_none() -> None:
 def test_a_camera_keeps_its_lens(tmp_path: Path) -> None:
     lens = xcalib.Lens("brown", [-0.3, 0.1, 0, 0.001])
     camera = xcalib.Pinhole.from_hfov(640, 480, 60, lens)
-    assert camera.hfov_deg == pytest.approx(60) and camera.resized(320, 240).lens == lens
+    assert camera.resized(320, 240).lens == lens
+    straight = xcalib.Lens("brown", [-0.3, 0.1, 0, 0])
+    assert xcalib.Pinhole.from_hfov(640, 480, 60, straight).hfov_deg == pytest.approx(60)
     assert "lens=Lens('brown', [-0.3, 0.1, 0.0, 0.001])" in repr(camera)
     rig = xcalib.Rig(camera, xcalib.Pinhole(640, 480, 600, 600, 320, 240, lens=lens))
     rig.save(tmp_path / "rig.yaml")
@@ -115,8 +119,18 @@ def test_words_of_lenses() -> None:
     assert parse("--source-lens", "auto") is None
     assert parse("--source-lens", "none") == xcalib.Lens()
     assert parse("x", "fisheye:0.1,-2e-2,0,0") == xcalib.Lens("fisheye", [0.1, -0.02, 0, 0])
-    for word in ("brown", "brown:", "brown:1,2,3", "none:1", "brown:1,2,3,x", "brown:1,,2,3", "tele:1"):
-        with pytest.raises(ValueError, match=f"--source-lens is '{word}', expected auto, none, brown:"):
+    for word in (
+        "brown",
+        "brown:",
+        "brown:1,2,3",
+        "none:1",
+        "brown:1,2,3,x",
+        "brown:1,,2,3",
+        "tele:1",
+    ):
+        with pytest.raises(
+            ValueError, match=f"--source-lens is '{word}', expected auto, none, brown:"
+        ):
             parse("--source-lens", word)
 
 

@@ -71,13 +71,13 @@ class Pinhole:
         cx: float,
         cy: float,
         skew: float = 0.0,
-        lens: Lens = Lens(),
+        lens: Lens | None = None,
     ) -> None:
         """Raises ValueError where a size is below 1, a focal length not > 0, or a value not
         finite.
         """
     @staticmethod
-    def from_hfov(width: int, height: int, hfov_deg: float, lens: Lens = Lens()) -> Pinhole:
+    def from_hfov(width: int, height: int, hfov_deg: float, lens: Lens | None = None) -> Pinhole:
         """Square pixels and the principal point at the centre; hfov_deg in (0, 180)."""
     @property
     def K(self) -> NDArray[float64]:

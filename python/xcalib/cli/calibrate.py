@@ -18,8 +18,8 @@ from .._core import (
     left_out,
     report_document,
 )
-from ..footage import lens_of_topic
 from ..flow import FlowProvider, NetworkFlow
+from ..footage import lens_of_topic
 from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
 from ..pipeline import choose_by_content, run_calibration, save_rig, with_fitted_plane
 from .arguments import (

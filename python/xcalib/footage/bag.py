@@ -273,7 +273,7 @@ class CameraInfo:
 def lens_of_topic(name: str | Path) -> Lens | None:
     """The lens that the camera_info beside a topic of images, ``BAG#TOPIC``, has; None if none."""
     path, _, topic = str(name).partition("#")
-    if not is_bag(path):
+    if not is_bag(Path(path)):
         return None
     try:
         infos = camera_infos(path)
