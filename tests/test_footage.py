@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from conftest import FRAMES, run
-from xcalib import Pinhole, Rig, metrics
+from xcalib import Lens, Pinhole, Rig, metrics
 from xcalib.depth import FolderDepth, PlaneDepth, read_depth
 from xcalib.footage import (
     OffsetEstimate,
@@ -22,6 +22,7 @@ from xcalib.footage import (
     camera_infos,
     encoder,
     estimate_offset,
+    lens_of_topic,
     match_depths,
     offsets_around,
     open_matched_depth,
@@ -334,7 +335,10 @@ def test_bags(tmp_path: Path, kind: str) -> None:
     assert info.K[1, 1] == 301 and info.D[0] == 0.1
     result = run("inspect", bag)
     assert result.exit_code == 0, result.output
-    assert "FX,FY,CX,CY 300,301,160,120 px" in result.stdout
+    assert "FX,FY,CX,CY 300,301,160,120 px, lens brown:0.1,0,0,0,0" in result.stdout
+    lens = Lens("brown", [0.1, 0, 0, 0, 0])
+    assert info.lens == lens_of_topic(f"{bag}#/visible") == lens
+    assert lens_of_topic(f"{bag}#/thermal") is None and lens_of_topic(tmp_path) is None
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])

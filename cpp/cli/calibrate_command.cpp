@@ -22,7 +22,8 @@ namespace {
 struct Arguments {
     FrameArguments frames;
     std::string output, choose = "informed", colormap = "auto", initial, search = "auto",
-                        mount = "auto", flow = "auto", solver = "ceres", report;
+                        mount = "auto", flow = "auto", solver = "ceres", report,
+                        reference_lens = "auto", source_lens = "auto";
     std::optional<std::string> reference_intrinsics, source_intrinsics;
     bool explain = false, refine_plane = false;
     CalibrationOptions options;
@@ -150,6 +151,8 @@ void run(Arguments a, Console& console) {
     CalibrationOptions& options = a.options;
     options.search.mode = value_of<SearchMode>("--search", a.search);
     options.mount = Mount::parse("--mount", a.mount);
+    options.reference_lens = Lens::parse("--reference-lens", a.reference_lens);
+    options.source_lens = Lens::parse("--source-lens", a.source_lens);
     options.flow = value_of("--flow", a.flow, flow_arguments());
     options.solver = value_of<Solver>("--solver", a.solver);
     std::optional<Pinhole> reference_camera, source_camera;
@@ -214,6 +217,16 @@ void run(Arguments a, Console& console) {
     }
     console.result(Json::parse(document));
     if (!result.converged) throw NotTrusted(result.report.message);
+}
+
+void add_lens(CLI::App& command, const std::string& camera, std::string& word) {
+    command
+        .add_option("--" + camera + "-lens", word,
+                    "Known lens of the " + camera +
+                        " camera, OpenCV's model and coefficients, kept; auto: that of the initial"
+                        " rig, or none.")
+        ->type_name("auto|none|brown:K1,K2,P1,P2[,K3[,K4,K5,K6]]|fisheye:K1,K2,K3,K4")
+        ->capture_default_str();
 }
 
 }  // namespace
@@ -294,6 +307,8 @@ void add_calibrate(CLI::App& app, Console& console) {
                      "Known intrinsics of the source camera, kept [px].  [default: none,"
                      " estimated]")
         ->type_name("FX,FY,CX,CY");
+    add_lens(*command, "reference", a.reference_lens);
+    add_lens(*command, "source", a.source_lens);
     command
         ->add_option("--reference-hfov", a.options.reference_hfov_deg,
                      "Horizontal field of view of the reference camera at the start [deg]."

@@ -57,21 +57,21 @@ void bind_pinhole(py::module_& m) {
 
 Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.)")
         .def(py::init([](int width, int height, double fx, double fy, double cx, double cy,
-                         double skew, const Lens& lens) {
-                 const Pinhole camera{width, height, fx, fy, cx, cy, skew, lens};
+                         double skew, const std::optional<Lens>& lens) {
+                 const Pinhole camera{width, height, fx, fy, cx, cy, skew, lens.value_or(Lens())};
                  camera.validate("Pinhole");
                  return camera;
              }),
              py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
-             py::arg("cy"), py::arg("skew") = 0.0, py::arg("lens") = Lens(),
+             py::arg("cy"), py::arg("skew") = 0.0, py::arg("lens") = py::none(),
              "Raises ValueError where a size is below 1, a focal length not > 0, or a value not "
              "finite.")
         .def_static(
             "from_hfov",
-            [](int width, int height, double hfov_deg, const Lens& lens) {
-                return Pinhole::from_hfov(width, height, hfov_deg * kDegree, lens);
+            [](int width, int height, double hfov_deg, const std::optional<Lens>& lens) {
+                return Pinhole::from_hfov(width, height, hfov_deg * kDegree, lens.value_or(Lens()));
             },
-            py::arg("width"), py::arg("height"), py::arg("hfov_deg"), py::arg("lens") = Lens(),
+            py::arg("width"), py::arg("height"), py::arg("hfov_deg"), py::arg("lens") = py::none(),
             "Square pixels and the principal point at the centre; hfov_deg in (0, 180), and no "
             "wider than what the lens shows.")
         .def_readwrite("width", &Pinhole::width, "[px]")

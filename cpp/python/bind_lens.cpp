@@ -44,6 +44,9 @@ before the lens, and what the intrinsic matrix takes to pixels after it.)")
         .def(py::init(&make_lens), py::arg("model") = "none",
              py::arg("coefficients") = std::vector<double>{},
              "Raises ValueError where the model is unknown, or has not so many coefficients.")
+        .def_static("parse", &Lens::parse, py::arg("option"), py::arg("word"),
+                    "The lens of a word as --source-lens takes it, 'brown:K1,K2,P1,P2'; None for "
+                    "'auto'. InputError, naming the option, otherwise.")
         .def_property_readonly(
             "model", [](const Lens& lens) { return name_of(lens.model()); },
             "'none', 'brown' or 'fisheye'.")

@@ -13,31 +13,40 @@ class DecodeError(InputError):
     """A file that cannot be decoded: truncated, or not what its name says."""
 
 class Lens:
-    """What a lens does to a pinhole's image: OpenCV's models and coefficients."""
+    """What a lens does to a pinhole's image: OpenCV's models and coefficients.
+
+    brown: k1 k2 p1 p2 [k3 [k4 k5 k6]]; fisheye: k1 k2 k3 k4; none. Points are normalized:
+    (X/Z, Y/Z) before the lens, and what the intrinsic matrix takes to pixels after it.
+    """
 
     def __init__(self, model: str = "none", coefficients: Sequence[float] = []) -> None:
-        """x"""
+        """Raises ValueError where the model is unknown, or has not so many coefficients."""
+    @staticmethod
+    def parse(option: str, word: str) -> Lens | None:
+        """The lens of a word as --source-lens takes it, 'brown:K1,K2,P1,P2'; None for 'auto'.
+        InputError, naming the option, otherwise.
+        """
     @property
     def model(self) -> str:
-        """x"""
+        """'none', 'brown' or 'fisheye'."""
     @property
     def coefficients(self) -> list[float]:
-        """x"""
+        """As many as were given."""
     @property
     def bends(self) -> bool:
-        """x"""
+        """Whether it does anything."""
     @property
     def max_radius(self) -> float:
-        """x"""
+        """Points farther from the axis, before the lens, have no image."""
     def distort(self, points: NDArray[Any]) -> NDArray[float64]:
-        """x"""
+        """(N, 2) where the lens shows points (N, 2); NaN where nowhere."""
     def undistort(self, points: NDArray[Any]) -> NDArray[float64]:
-        """x"""
+        """(N, 2) points that the lens shows at (N, 2); NaN where none."""
     def __eq__(self, other: object) -> bool: ...
     def __hash__(self) -> int: ...
 
 class Pinhole:
-    """A pinhole camera, Eq. (intrinsic) of the paper.
+    """A pinhole camera, Eq. (intrinsic) of the paper, and its lens.
 
     Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.
     """
@@ -68,20 +77,22 @@ class Pinhole:
         cx: float,
         cy: float,
         skew: float = 0.0,
-        lens: Lens = Lens(),
+        lens: Lens | None = None,
     ) -> None:
         """Raises ValueError where a size is below 1, a focal length not > 0, or a value not
         finite.
         """
     @staticmethod
-    def from_hfov(width: int, height: int, hfov_deg: float, lens: Lens = Lens()) -> Pinhole:
-        """Square pixels and the principal point at the centre; hfov_deg in (0, 180)."""
+    def from_hfov(width: int, height: int, hfov_deg: float, lens: Lens | None = None) -> Pinhole:
+        """Square pixels and the principal point at the centre; hfov_deg in (0, 180), and no
+        wider than what the lens shows.
+        """
     @property
     def K(self) -> NDArray[float64]:
         """(3, 3) float64 intrinsic matrix [px]."""
     @property
     def hfov_deg(self) -> float:
-        """Horizontal field of view, 2 atan(width / (2 fx)) [deg]."""
+        """Horizontal field of view, 2 atan(width / (2 fx)) without a lens [deg]."""
     @property
     def vfov_deg(self) -> float:
         """Vertical field of view [deg]."""
@@ -135,12 +146,12 @@ class Rig:
         """(4,) float64 unit quaternion of R."""
     @property
     def mount(self) -> str:
-        """How the source image is turned against the reference's, in words: 'upright' up to 15 deg
-        of roll, 'upside down', 'turned by 90 deg clockwise', 'mirrored', ...
+        """How the source image is turned against the reference's, in words: 'upright' up to 15
+        deg of roll, 'upside down', 'turned by 90 deg clockwise', 'mirrored', ...
         """
     @property
     def infinite_homography(self) -> NDArray[float64]:
-        """(3, 3) float64, K_S R K_R^-1: where points at infinity go."""
+        """(3, 3) float64, K_S R K_R^-1: where points at infinity go, lenses aside."""
     def resized(
         self, reference_width: int, reference_height: int, source_width: int, source_height: int
     ) -> Rig:
@@ -223,9 +234,13 @@ class CalibrationOptions:
     source_camera: Pinhole | None
     """Known intrinsics, frozen, or None."""
     reference_lens: Lens | None
-    """x"""
+    """Lens of the reference's images, frozen. None: that of reference_camera or of the initial
+    rig, or none.
+    """
     source_lens: Lens | None
-    """x"""
+    """Lens of the source's images, frozen. None: that of source_camera or of the initial rig, or
+    none.
+    """
     reference_hfov_deg: float | None
     """Horizontal field of view to assume [deg], or None to search it."""
     optimize_reference: bool
@@ -237,8 +252,8 @@ class CalibrationOptions:
     and the rig has both. None: metric depth.
     """
     mount: str
-    """How the source image is turned: 'auto' (upright, and where that is not found any), 'upright',
-    degrees clockwise as '90', 'mirrored', or both as 'mirrored-90'.
+    """How the source image is turned: 'auto' (upright, and where that is not found any),
+    'upright', degrees clockwise as '90', 'mirrored', or both as 'mirrored-90'.
     """
     search: SearchOptions
     """SearchOptions."""
@@ -984,9 +999,7 @@ class Stream:
     def parallel(self) -> bool:
         """Whether several threads may read at a time."""
     times: NDArray[float64] | None
-    """(N,) seconds of the frames, never falling; None where unknown. Each stream has its
-        clock.
-        """
+    """(N,) seconds of the frames, never falling; None where unknown. Each stream has its clock."""
 
 class Picked(Stream):
     """Some frames of a stream, in order."""

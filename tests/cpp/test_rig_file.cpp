@@ -70,6 +70,11 @@ class RigFile : public ::testing::Test {
         return message;
     }
 
+    std::string text() const {
+        std::ifstream in(path_);
+        return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    }
+
     std::size_t files() const {
         return static_cast<std::size_t>(
             std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
@@ -278,6 +283,47 @@ TEST_F(RigFile, AMirroredSourceIsKeptInVersion2) {
     EXPECT_EQ(in_c.source_mirrored, 1);
     EXPECT_TRUE(has(refusal_with("version: 1", "version: 2\nsource_mirrored: perhaps"),
                     "source_mirrored = perhaps, expected true or false"));
+}
+
+TEST_F(RigFile, LensesAreKeptInVersion2) {
+    std::ofstream(path_) << kText;
+    Rig rig = load_rig(path_);
+    rig.reference.lens = Lens(LensModel::fisheye, {0.01, -0.002, 0, 1e-5});
+    rig.source.lens = Lens(LensModel::brown, {-0.367, 0.03, 0.007, 0.003, 0.1 + 0.2});
+    save_rig(rig, path_);
+    EXPECT_TRUE(has(text(), "version: 2\n"));
+    EXPECT_TRUE(
+        has(text(), "  lens:\n    model: fisheye\n    coefficients: [0.01, -0.002, 0, 1e-05]"));
+    const Rig back = load_rig(path_);
+    EXPECT_EQ(back.reference.lens, rig.reference.lens);
+    EXPECT_EQ(back.source.lens, rig.source.lens);
+    EXPECT_EQ(back.source.lens.coefficients().size(), 5u);
+    rig.reference.lens = rig.source.lens = Lens();
+    save_rig(rig, path_);
+    EXPECT_TRUE(has(text(), "version: 1\n")) << "which older software reads";
+    xcalib_rig in_c;
+    save_rig(back, path_);
+    ASSERT_EQ(xcalib_load_rig(path_.c_str(), &in_c), XCALIB_OK);
+    EXPECT_EQ(in_c.reference.lens, XCALIB_LENS_FISHEYE);
+    EXPECT_EQ(in_c.reference.lens_coefficients[3], 1e-5);
+    EXPECT_EQ(in_c.source.lens, XCALIB_LENS_BROWN);
+    EXPECT_EQ(in_c.source.lens_coefficients[4], 0.1 + 0.2);
+    EXPECT_EQ(in_c.source.lens_coefficients[5], 0);
+}
+
+TEST_F(RigFile, ALensThatIsNoneIsNamed) {
+    const auto with = [&](const std::string& lens) {
+        return refusal_with("  skew: 0.25\n", "  skew: 0.25\n  lens: " + lens + "\n");
+    };
+    EXPECT_TRUE(has(with("{model: tele, coefficients: []}"),
+                    "source.lens.model = tele, expected none, brown or fisheye"));
+    EXPECT_TRUE(has(with("{model: brown, coefficients: [1, 2, 3]}"),
+                    "source.lens: a lens of model "
+                    "brown has 3 coefficients"));
+    EXPECT_TRUE(has(with("{model: brown, coefficients: 1}"),
+                    "source.lens.coefficients = 1, expected a list of numbers"));
+    EXPECT_TRUE(has(with("{model: brown, coefficients: [1, 2, 3, .inf]}"), "expected a finite"));
+    EXPECT_TRUE(has(with("brown"), "expected a mapping of fields in source.lens"));
 }
 
 TEST_F(RigFile, ReadsTheSameInC) {

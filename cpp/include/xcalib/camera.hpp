@@ -26,8 +26,8 @@ struct Pinhole {
     double skew = 0.0;  // [px]
     Lens lens = {};
 
-    // Square pixels, principal point at the image centre; hfov() is this. hfov in (0, pi), and what
-    // the lens shows.
+    // Square pixels, principal point at the image centre; hfov() is this, but for p1 and p2 of the
+    // lens. hfov in (0, pi), and what the lens shows.
     static Pinhole from_hfov(int width, int height, double hfov, const Lens& lens = {});
     // The inverse of K(); K may have any scale.
     static Pinhole from_K(int width, int height, const Eigen::Matrix3d& K);

@@ -109,7 +109,8 @@ void settle_relative_depth(Attempt& attempt, CalibrationResult& result) {
     const Plan& plan = attempt.plan;
     const double farthest = farthest_inverse_depth(*attempt.images);
     RelativeDepth relative = *plan.options.relative_depth;
-    const bool known = plan.options.source_camera.has_value();
+    // With another shift goes another source, but for what a lens bends.
+    const bool known = plan.options.source_camera || result.rig.source.lens.bends();
     const double shift = known ? best_shift(*attempt.images, plan, farthest, result.rig)
                                : ordinary_shift(result.rig, farthest);
     attempt.images = std::make_shared<WorkingImages>(with_shifted_depth(*attempt.images, shift));

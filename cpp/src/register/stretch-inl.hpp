@@ -216,7 +216,9 @@ HWY_INLINE Vectors gather(const Source& source, Vectors vectors, const Stretch& 
             b = hn::Load(d, vector.b);
         }
         const Int left = within(x, source.width), top = within(y, source.height);
-        others |= Vectors{!none(hn::Or(hn::Xor(x, left), hn::Xor(y, top)))} << i;
+        const Int beyond = hn::Or(hn::Xor(x, left), hn::Xor(y, top));
+        others |= Vectors{!none(beyond)} << i;
+        if (hn::AllFalse(di, hn::Eq(beyond, hn::Zero(di)))) continue;  // nothing to look up
         Float values[kChannels];
         interpolate_anywhere<T>(source, left, top, a, b, values);
         store_pixels(values, out + i * kLanes * kChannels);
@@ -239,7 +241,34 @@ HWY_INLINE Vectors sample_fixed(const Source& source, int count, Stretch& stretc
         const UsualVector& vector = stretch.vectors[i];
         const Int x = hn::Sub(hn::BitCast(di, hn::Load(d, vector.x)), set(windows.x[i]));
         const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
-        const bool inside = interpolate_fixed(source, windows.offset[i], x, y, out + i * kLanes);
+        const bool inside = interpolate_fixed<1>(source, windows.offset[i], x, y, out + i * kLanes);
+        others |= Vectors{!inside} << i;
+        hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
+    }
+    return others;
+}
+
+// The same of some of the vectors, in three rows of the source: where a lens bends rows, their
+// points often come into the next one.
+HWY_INLINE Vectors sample_fixed_bent(const Source& source, Vectors vectors, const Stretch& stretch,
+                                     std::uint8_t* out, std::uint8_t* mask) {
+    if (source.height < 3) return vectors;
+    const FloatTag d;
+    const IntTag di;
+    const Windows& windows = stretch.source;
+    Vectors others = 0;
+    for (; vectors; vectors &= vectors - 1) {
+        const int i = first_of(vectors);
+        const UsualVector& vector = stretch.vectors[i];
+        const Int x = hn::Sub(hn::BitCast(di, hn::Load(d, vector.x)), set(windows.x[i]));
+        const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
+        // The window has begun in the row of the first point.
+        const int row = (windows.y[i] - kLargeBits) >> kFixedBits;
+        const int above = hn::AllFalse(di, hn::Lt(y, hn::Zero(di))) ? 0 : 1;
+        const int moved = std::clamp(row - above, 0, source.height - 3) - row;
+        const bool inside = interpolate_fixed<2>(
+            source, windows.offset[i] + moved * static_cast<int>(source.row_bytes), x,
+            hn::Sub(y, set(moved * (1 << kFixedBits))), out + i * kLanes);
         others |= Vectors{!inside} << i;
         hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
     }
@@ -283,6 +312,7 @@ HWY_INLINE Vectors sample_stretch(const RowsTask& task, const Source& source, Re
             locate_any<true, with_cells>(task, row.fixed, depths, y, begin, count, to, kBytes,
                                          stretch);
             others = sample_fixed(source, count, stretch, out, mask);
+            if (row.fixed.bends) others = sample_fixed_bent(source, others, stretch, out, mask);
             return gather<T, 1, true>(source, others, stretch, out, mask);
         }
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import click
 
 from .._core import (
     CalibrationOptions,
+    Lens,
     Pinhole,
     Rig,
     _flow_arguments,
@@ -17,6 +19,7 @@ from .._core import (
     report_document,
 )
 from ..flow import FlowProvider, NetworkFlow
+from ..footage import lens_of_topic
 from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
 from ..pipeline import choose_by_content, run_calibration, save_rig, with_fitted_plane
 from .arguments import (
@@ -46,6 +49,18 @@ def intrinsics(
     if not (fx > 0 and fy > 0 and all(map(math.isfinite, (fx, fy, cx, cy)))):
         raise click.BadParameter(f"{value!r}: expected finite numbers, FX and FY above 0 px")
     return fx, fy, cx, cy
+
+
+def lens_option(camera: str) -> Callable[[Any], Any]:
+    """``--reference-lens`` or ``--source-lens``."""
+    return click.option(
+        f"--{camera}-lens",
+        metavar="auto|none|brown:K1,K2,P1,P2[,K3[,K4,K5,K6]]|fisheye:K1,K2,K3,K4",
+        default="auto",
+        show_default=True,
+        help=f"Known lens of the {camera} camera, OpenCV's model and coefficients, kept; auto: that"
+        f" of the initial rig, with --{camera}-intrinsics that of a bag's camera_info, or none.",
+    )
 
 
 def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
@@ -162,6 +177,8 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     callback=intrinsics,
     help="Known intrinsics of the source camera, kept [px].  [default: none, estimated]",
 )
+@lens_option("reference")
+@lens_option("source")
 @click.option(
     "--reference-hfov",
     metavar="DEG",
@@ -215,6 +232,8 @@ def command(
     solver: str,
     reference_intrinsics: tuple[float, float, float, float] | None,
     source_intrinsics: tuple[float, float, float, float] | None,
+    reference_lens: str,
+    source_lens: str,
     reference_hfov: float | None,
     optimize_reference: bool,
     working_width: int,
@@ -256,15 +275,23 @@ def command(
     calibration.search.max_roll_deg = max_roll
     calibration.search.max_fov_ratio = max_fov_ratio
     calibration.mount = mount
+    calibration.reference_lens = Lens.parse("--reference-lens", reference_lens)
+    calibration.source_lens = Lens.parse("--source-lens", source_lens)
     calibration.solver = solver
     calibration.validate()
     calibration.flow, flow = flow_of(flow_spec)
 
     def set_cameras(calibration: CalibrationOptions, reference: Image, source: Image) -> None:
         if reference_intrinsics:
-            calibration.reference_camera = Pinhole(*size_of(reference), *reference_intrinsics)
+            lens = lens_of_topic(inputs["reference"]) if reference_lens == "auto" else None
+            calibration.reference_camera = Pinhole(
+                *size_of(reference), *reference_intrinsics, lens=lens or Lens()
+            )
         if source_intrinsics:
-            calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
+            lens = lens_of_topic(inputs["source"]) if source_lens == "auto" else None
+            calibration.source_camera = Pinhole(
+                *size_of(source), *source_intrinsics, lens=lens or Lens()
+            )
 
     initial_rig = Rig.load(initial) if initial else None
     frames = open_frames(inputs, threads, initial_rig)

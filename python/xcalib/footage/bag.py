@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import Lens
 from ..frames import DecodeError, Image, InputError, as_image, is_truncated, quiet_opencv
 from .stream import Stream, Times
 
@@ -23,6 +24,13 @@ BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 
 RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+# Lenses by the distortion models of camera_info.
+LENSES = {
+    "plumb_bob": "brown",
+    "rational_polynomial": "brown",
+    "equidistant": "fisheye",
+    "fisheye": "fisheye",
+}
 
 # Type, channels, and how to get to gray or to blue-green-red.
 ENCODINGS: dict[str, tuple[type[np.generic], int, int | None]] = {
@@ -238,14 +246,44 @@ class CameraInfo:
     D: NDArray[np.float64]
     """Coefficients of the model."""
 
+    @property
+    def lens(self) -> Lens | None:
+        """The lens of the model; None where there is no such."""
+        model = LENSES.get(self.model)
+        if not self.D.any() and model != "fisheye":
+            return Lens()
+        try:
+            return None if model is None else Lens(model, self.D.tolist())
+        except ValueError:  # not so many coefficients
+            return None
+
     def line(self) -> str:
-        """In words; the intrinsics as ``--reference-intrinsics`` takes them."""
+        """In words; the intrinsics and the lens as the options of ``calibrate`` take them."""
         fx, fy, cx, cy = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
-        bent = f"{self.model} {np.array2string(self.D, precision=6)}" if self.D.any() else "none"
+        numbers = ",".join(f"{value:.6g}" for value in self.D)
+        bent = f"distortion {self.model} {numbers}, which no lens here is"
+        if (lens := self.lens) is not None:
+            bent = f"lens {lens.model}" + (f":{numbers}" if lens.coefficients else "")
         return (
             f"{self.topic}: {self.width}x{self.height} px,"
-            f" FX,FY,CX,CY {fx:.6g},{fy:.6g},{cx:.6g},{cy:.6g} px, distortion {bent}"
+            f" FX,FY,CX,CY {fx:.6g},{fy:.6g},{cx:.6g},{cy:.6g} px, {bent}"
         )
+
+
+def lens_of_topic(name: str | Path) -> Lens | None:
+    """The lens that the camera_info beside a topic of images, ``BAG#TOPIC``, has; None if none."""
+    path, _, topic = str(name).partition("#")
+    if not is_bag(Path(path)):
+        return None
+    try:
+        infos = camera_infos(path)
+    except InputError:
+        return None
+    for info in infos:
+        beside = info.topic.rpartition("/")[0]
+        if f"{topic}/".startswith(f"{beside}/") or (not topic and len(infos) == 1):
+            return info.lens
+    return None
 
 
 def camera_infos(path: str | Path) -> list[CameraInfo]:

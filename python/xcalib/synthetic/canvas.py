@@ -1,7 +1,8 @@
 """A camera with a lens, rendered: its view without one, from which the lens takes its samples.
 
-Faces are bounded by straight lines only without a lens. So what a bent image shows is rendered by a
-pinhole, on a canvas wide enough for all of it and at least as fine, and sampled where the lens looks.
+Faces are bounded by straight lines only without a lens. So what a bent image shows is rendered by
+a pinhole, on a canvas wide enough for all of it and at least as fine, and sampled where the lens
+looks.
 """
 
 from __future__ import annotations
