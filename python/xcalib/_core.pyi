@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, overload
@@ -301,6 +301,29 @@ class AdamStep:
     def total(self) -> float:
         """Eq. (total_loss)."""
 
+class LagFit:
+    """The fit with the sources some frames later, refitted."""
+    @property
+    def lag(self) -> int: ...
+    @property
+    def frames(self) -> int: ...
+    @property
+    def nec(self) -> float: ...
+    @property
+    def gain(self) -> float: ...
+    @property
+    def error(self) -> float: ...
+    @property
+    def rig(self) -> Rig: ...
+
+class LagReport:
+    """By how much the source is late beside its pairing."""
+    @property
+    def frames(self) -> int: ...
+    @property
+    def fits(self) -> list[LagFit]: ...
+    def line(self) -> str: ...
+
 class CalibrationReport:
     """How a calibration went."""
     @property
@@ -358,6 +381,8 @@ class CalibrationReport:
     @property
     def steps(self) -> list[AdamStep]:
         """AdamStep, of solver 'adam'."""
+    @property
+    def lag(self) -> LagReport: ...
     def brief(self) -> str:
         """One line."""
     def full(self) -> str:
@@ -631,6 +656,8 @@ class Pairing:
     @property
     def offset(self) -> float:
         """By how much the source's clock is late [s]."""
+    @property
+    def lag(self) -> int: ...
     def line(self) -> str:
         """What happened, in one line."""
 
@@ -947,6 +974,9 @@ class Half(Stream):
     def __init__(self, stream: Stream, half: str) -> None:
         """half: left, right, top or bottom."""
 
+def oriented(stream: Stream) -> Stream: ...
+def orientation_line(stream: Stream, applied: bool) -> str: ...
+def as_stored(file: bytes) -> bytes: ...
 def read_times(table: str | PathLike[str], stream: Stream) -> list[float]:
     """Seconds of the frames of a stream from a file of `name timestamp` lines, see
     times_of_table().
@@ -1015,6 +1045,18 @@ def refine_offset(
     are left out. Raises InputError without candidates or times.
     """
 
+class TimeOffset:
+    """What --time-offset says."""
+    @property
+    def automatic(self) -> bool: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def frames(self) -> int: ...
+
+def parse_time_offset(text: str) -> TimeOffset: ...
+def is_sequence(stream: Stream) -> bool: ...
+
 class Pairs:
     """Two streams, and which of their frames belong together."""
     def __init__(
@@ -1027,6 +1069,7 @@ class Pairs:
         reference_times: str | PathLike[str] | None = None,
         source_times: str | PathLike[str] | None = None,
         estimate: OffsetEstimate | None = None,
+        frame_offset: int = 0,
     ) -> None:
         """As pair_streams(); time_offset None: estimated. The tables are read by read_times().
         Nothing else is read, save that an offset to be estimated, unless there is an
@@ -1047,6 +1090,10 @@ class Pairs:
     @property
     def all_references(self) -> Stream:
         """With those that do not."""
+    @property
+    def all_sources(self) -> Stream: ...
+    @property
+    def offset(self) -> TimeOffset: ...
     @property
     def pairing(self) -> Pairing:
         """Indices into the streams."""
@@ -1078,6 +1125,30 @@ def left_out(count: int, first: str) -> str:
 
 def with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str:
     """The message with the file that the core, which sees arrays only, calls `frame N`."""
+
+def fit_lags(
+    references: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    sources: Mapping[int, Sequence[NDArray[Any] | None]],
+    rig: Rig,
+    options: CalibrationOptions = ...,
+) -> LagReport: ...
+def look_at_lags(
+    references: Sequence[NDArray[Any]],
+    sources: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    partners: Sequence[int],
+    all_sources: Stream,
+    rig: Rig,
+    options: CalibrationOptions,
+    progress: Callable[[float], object],
+) -> LagReport: ...
+def add_lags(
+    result: CalibrationResult, lag: LagReport, offset: TimeOffset, all_sources: Stream
+) -> None: ...
+def frames_later(
+    all_sources: Stream, partners: Sequence[int], lag: int
+) -> tuple[list[int], list[int]]: ...
 
 class Registration:
     """How far a stream is registered, and its totals."""
