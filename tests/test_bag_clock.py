@@ -37,9 +37,7 @@ def write_bag(path: Path, topics: dict[str, tuple[list[np.ndarray], list[int], l
                 height, width = image.shape[:2]
                 kind = "mono8" if image.dtype == np.uint8 else "32FC1"
                 pixels = np.ascontiguousarray(image).view(np.uint8).ravel()
-                message = types[name](
-                    header, height, width, kind, 0, pixels.size // height, pixels
-                )
+                message = types[name](header, height, width, kind, 0, pixels.size // height, pixels)
                 writer.write(connection, START + log, store.serialize_cdr(message, name))
     return str(next(path.glob("*.mcap")))
 
@@ -96,7 +94,7 @@ def test_a_stamp_that_repeats_once_does_not_part_the_clocks(tmp_path: Path) -> N
     [
         ({5: 3 * FRAME}, "of /t fall at frame 5"),
         ({5: 4 * FRAME, 8: 7 * FRAME, 10: 9 * FRAME}, "of /t repeat 3 times, first at frame 5"),
-        ({i: -1 for i in range(12)}, "of /t are not set"),
+        (dict.fromkeys(range(12), -1), "of /t are not set"),
     ],
 )
 def test_stamps_that_cannot_be_used_send_both_topics_to_recording_time(
@@ -163,5 +161,3 @@ def test_the_commands_say_by_which_clock(rendered: Path, tmp_path: Path) -> None
     assert refused.exit_code == 2
     assert "go by header stamps, which the depth topic cannot" in refused.stderr
     assert "its header stamps are not set; expected one clock" in refused.stderr
-
-

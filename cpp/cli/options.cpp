@@ -60,8 +60,8 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
             [&arguments](const std::string& text) {
                 arguments.time_offset = parse_time_offset(text);
             },
-            "By how much the source's clock is late: seconds, source frames (`2f`), or `auto`: from"
-            " the footage, and from its registration.")
+            "By how much the source's clock is late: seconds, source frames (`2f`), or `auto`:"
+            " from the footage, and from its registration.")
         ->type_name("S")
         ->default_str("0");
     command

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kCoarsest = 4, kMiddle = 2, kFinest = 1;  // levels
 constexpr int kIterations = 8;                          // of a refit at a level
-constexpr double kDeviations = 3.5;                     // of the mean difference that decide
+constexpr double kDeviations = 3.0;                     // of the mean difference that decide
 constexpr double kLeast = 0.002;                        // difference of the NEC that decides
 constexpr double kHopeless = 5.0;  // deviations at which a lag is looked at no more
 

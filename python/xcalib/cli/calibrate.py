@@ -32,7 +32,6 @@ from .arguments import (
 )
 from .errors import NOT_TRUSTED, stop, warn
 
-
 LAG_ROUNDS = 2
 """Times at most that a lag is taken up, each of some frames."""
 

@@ -32,8 +32,8 @@ FOOTAGE_OPTIONS: tuple[Callable[[Any], Any], ...] = (
         default="0",
         show_default=True,
         callback=clock_offset,
-        help="By how much the source's clock is late: seconds, source frames (`2f`), or `auto`: from"
-        " the footage, and from its registration.",
+        help="By how much the source's clock is late: seconds, source frames (`2f`), or `auto`:"
+        " from the footage, and from its registration.",
     ),
     click.option(
         "--max-gap",
