@@ -903,7 +903,7 @@ def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> No
     for arguments, named in (
         ((visible, thermal, "--time-offset", "soon"), "'soon' is neither `auto` nor a number"),
         ((visible, thermal, "--time-offset", "1"), "needs frames paired by time; they are by name"),
-        ((visible, thermal, "--time-offset", "auto"), "needs times of both streams"),
+        ((visible, thermal, "--time-offset", "auto", "--pair", "time"), "needs times of both"),
         ((visible, thermal, "--pair", "time"), "reference frames have no times"),
         ((visible, tmp_path / "no.mp4"), "no.mp4: no such file"),
         ((visible, f"{thermal}#down"), "thermal#down: expected #TOPIC"),

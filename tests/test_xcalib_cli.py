@@ -339,7 +339,8 @@ def test_bench_times_frames(cli: Callable[..., Process], rendered: Path) -> None
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--refine-plane"),
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--initial", "no.yaml"),
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "1"),
-        ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "auto"),
+        ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "1s"),
+        ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "9f"),
         (
             "register",
             "rig.yaml",
@@ -352,7 +353,7 @@ def test_bench_times_frames(cli: Callable[..., Process], rendered: Path) -> None
             "--time-offset",
             "auto",
             "--pair",
-            "name",
+            "time",
         ),
         (
             "calibrate",

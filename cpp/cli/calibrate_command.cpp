@@ -15,6 +15,7 @@
 #include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
 #include "xcalib/stream/files.hpp"
+#include "xcalib/stream/neighbours.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -124,6 +125,34 @@ CalibrationResult calibrated(const Frames& frames, const LoadedFrames& loaded,
     }
 }
 
+// Fits at the lags around, for footage that is a sequence. A lag that fits better is taken up where
+// it is to be found (`--time-offset auto`): `frames`, `loaded` and `result` are then those of it.
+// Otherwise the result is not to be trusted.
+void look_at_lags(Frames& frames, LoadedFrames& loaded, const CalibrationOptions& options,
+                  const std::optional<Rig>& initial, Console& console, CalibrationResult& result) {
+    constexpr int kLagRounds = 2;  // times at most that a lag is taken up
+    for (int round = 0;; ++round) {
+        FittedFrames fitted{loaded.views(&Frame::reference),
+                            loaded.views(&Frame::source),
+                            loaded.views(&Frame::depth),
+                            {}};
+        for (const int index : loaded.indices)
+            fitted.partners.push_back(frames.partners[static_cast<std::size_t>(index)]);
+        const LagReport lag =
+            fit_lags(fitted, *frames.all_sources, result.rig, options,
+                     [&](double share) { console.progress("lags", 0.9 * share); });
+        if (lag.frames == 0 || !frames.offset.automatic || round == kLagRounds) {
+            add_lags(lag, frames.offset, *frames.all_sources, result);
+            return;
+        }
+        console.note("clock offset: " + lag.line() + ", taken up");
+        std::vector<int> chosen = loaded.indices;
+        frames = with_lag(frames, lag.frames, chosen);
+        loaded = load(frames, chosen, console);
+        result = calibrated(frames, loaded, options, initial, console);
+    }
+}
+
 void check(const Arguments& a) {
     if (a.reference_intrinsics && (a.options.reference_hfov_deg || a.options.optimize_reference))
         throw InputError(
@@ -197,12 +226,14 @@ void run(Arguments a, Console& console) {
         const DepthPointer depth = plane_depth(plane);
         for (std::size_t i = 0; i < loaded.frames.size(); ++i)
             loaded.frames[i].depth = (*depth)(loaded.indices[i], loaded.frames[i].reference);
+        frames.depth = depth;
         result = calibrated(frames, loaded, options, result.rig, console);
         std::ostringstream text;
         text << "plane: --horizon " << plane.horizon << " --plane-roll " << plane.roll_deg;
         console.line(text.str());
         console.event("plane", {{"horizon", plane.horizon}, {"plane_roll", plane.roll_deg}});
     }
+    look_at_lags(frames, loaded, options, initial, console, result);
     const Path output(a.output);
     if (output.has_parent_path()) std::filesystem::create_directories(output.parent_path());
     save_rig(result.rig, a.output);

@@ -1,27 +1,12 @@
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 
 #include "xcalib/error.hpp"
 #include "xcalib/footage/pairing.hpp"
 
 namespace xcalib::cli {
 namespace {
-
-std::optional<double> seconds(const std::string& text) {
-    if (text == "auto") return std::nullopt;
-    std::size_t used = 0;
-    double value = NAN;
-    try {
-        value = std::stod(text, &used);
-    } catch (const std::exception&) {
-    }
-    if (used != text.size() || !std::isfinite(value))
-        throw InputError("Invalid value for '--time-offset': '" + text +
-                         "' is neither `auto` nor a number of seconds");
-    return value;
-}
 
 void add_depth(CLI::App& command, DepthArguments& arguments) {
     command
@@ -72,9 +57,11 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
     command
         .add_option_function<std::string>(
             "--time-offset",
-            [&arguments](const std::string& text) { arguments.time_offset = seconds(text); },
-            "By how much the source's clock is late [s], or `auto`: from the footage, and from its"
-            " registration where a rig is given.")
+            [&arguments](const std::string& text) {
+                arguments.time_offset = parse_time_offset(text);
+            },
+            "By how much the source's clock is late: seconds, source frames (`2f`), or `auto`:"
+            " from the footage, and from its registration.")
         ->type_name("S")
         ->default_str("0");
     command
@@ -91,6 +78,13 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
         .add_option("--source-times", arguments.source_times,
                     "Times of the source frames: lines `name timestamp`.  [default: their own]")
         ->type_name("FILE");
+    command
+        .add_option("--exif-orientation", arguments.exif_orientation,
+                    "Image files that say how their picture is to be turned: take pixels as they"
+                    " are stored (ignore), or turn them (apply).")
+        ->type_name("HOW")
+        ->check(CLI::IsMember({"ignore", "apply"}))
+        ->capture_default_str();
 }
 
 }  // namespace

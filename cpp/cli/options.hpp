@@ -7,6 +7,7 @@
 
 #include "xcalib/depth/complete_depth.hpp"
 #include "xcalib/depth/plane_depth.hpp"
+#include "xcalib/footage/sequence.hpp"
 
 namespace CLI {
 class App;
@@ -26,9 +27,10 @@ struct FrameArguments {
     std::string reference, source;
     DepthArguments depth;
     std::string pairing = "auto";
-    std::optional<double> time_offset = 0.0;  // [s]; none: estimated
+    TimeOffset time_offset;
     std::optional<double> max_gap;
     std::string reference_times, source_times;
+    std::string exif_orientation = "ignore";
 };
 
 // REFERENCE, SOURCE and how they and their depth are read.

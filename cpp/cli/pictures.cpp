@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
+#include "xcalib/footage/exif.hpp"
 #include "xcalib/stream/files.hpp"
 
 namespace xcalib::cli {
@@ -77,12 +78,12 @@ cv::Mat read_image(const Path& file) {
 
 cv::Mat decode(const Path& file) {
     if (!std::filesystem::is_regular_file(file)) throw InputError(file.string() + ": no such file");
-    const std::string data = read_file(file);
+    std::string data = read_file(file);
+    forget_tiff_orientation(data);
     cv::Mat pixels;
     if (!data.empty() && !is_truncated(data)) {
         try {
-            const cv::Mat bytes(1, static_cast<int>(data.size()), CV_8U,
-                                const_cast<char*>(data.data()));
+            const cv::Mat bytes(1, static_cast<int>(data.size()), CV_8U, data.data());
             pixels = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
         } catch (const cv::Exception&) {
             pixels.release();

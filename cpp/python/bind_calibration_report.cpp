@@ -63,6 +63,24 @@ void bind_adam_step(py::module_& m) {
         .def_readonly("total", &AdamStep::total, "Eq. (total_loss).");
 }
 
+void bind_lag_report(py::module_& m) {
+    py::class_<LagFit>(m, "LagFit", "The fit with the sources some frames later, refitted.")
+        .def_readonly("lag", &LagFit::lag,
+                      "That a source is later than its own frame [source frames].")
+        .def_readonly("frames", &LagFit::frames, "References that have such a source.")
+        .def_readonly("nec", &LagFit::nec, "Mean over them.")
+        .def_readonly("gain", &LagFit::gain,
+                      "NEC of a reference above its own at lag 0, mean over those that have both.")
+        .def_readonly("error", &LagFit::error, "Standard error of the gain.")
+        .def_readonly("rig", &LagFit::rig, "Rig, refitted.");
+    py::class_<LagReport>(m, "LagReport", "By how much the source is late beside its pairing.")
+        .def_readonly("frames", &LagReport::frames,
+                      "[source frames]; 0 too where it cannot be told.")
+        .def_readonly("fits", &LagReport::fits,
+                      "LagFit, by rising lag; none where the footage is no sequence.")
+        .def("line", &LagReport::line, "How the fits compare.");
+}
+
 }  // namespace
 
 void bind_calibration_report(py::module_& m) {
@@ -70,6 +88,7 @@ void bind_calibration_report(py::module_& m) {
     bind_candidate_report(m);
     bind_lens_report(m);
     bind_adam_step(m);
+    bind_lag_report(m);
     py::class_<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
         .def_readonly("message", &CalibrationReport::message, "Why, in one line.")
@@ -104,6 +123,7 @@ void bind_calibration_report(py::module_& m) {
         .def_readonly("levels", &CalibrationReport::levels, "In the order solved.")
         .def_readonly("lens", &CalibrationReport::lens, "LensReport, of solver 'ceres'.")
         .def_readonly("steps", &CalibrationReport::steps, "AdamStep, of solver 'adam'.")
+        .def_readonly("lag", &CalibrationReport::lag, "LagReport, where the footage is a sequence.")
         .def("brief", &CalibrationReport::brief, "One line.")
         .def("full", &CalibrationReport::full, "A table.")
         .def(

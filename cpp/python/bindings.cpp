@@ -51,8 +51,10 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_steady_depth(m);
 
     xcalib::bind_stream(m);
+    xcalib::bind_sequence(m);
     xcalib::bind_pairs(m);
     xcalib::bind_frames(m);
+    xcalib::bind_lags(m);
     xcalib::bind_register_frames(m);
 
     xcalib::bind_evaluate(m);

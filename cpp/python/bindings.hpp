@@ -29,7 +29,9 @@ void bind_steady_depth(pybind11::module_& m);
 
 void bind_stream(pybind11::module_& m);
 void bind_pairs(pybind11::module_& m);
+void bind_sequence(pybind11::module_& m);
 void bind_frames(pybind11::module_& m);
+void bind_lags(pybind11::module_& m);
 void bind_register_frames(pybind11::module_& m);
 
 void bind_evaluate(pybind11::module_& m);

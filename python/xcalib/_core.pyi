@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, overload
@@ -363,6 +363,38 @@ class AdamStep:
     def total(self) -> float:
         """Eq. (total_loss)."""
 
+class LagFit:
+    """The fit with the sources some frames later, refitted."""
+    @property
+    def lag(self) -> int:
+        """That a source is later than its own frame [source frames]."""
+    @property
+    def frames(self) -> int:
+        """References that have such a source."""
+    @property
+    def nec(self) -> float:
+        """Mean over them."""
+    @property
+    def gain(self) -> float:
+        """NEC of a reference above its own at lag 0, mean over those that have both."""
+    @property
+    def error(self) -> float:
+        """Standard error of the gain."""
+    @property
+    def rig(self) -> Rig:
+        """Rig, refitted."""
+
+class LagReport:
+    """By how much the source is late beside its pairing."""
+    @property
+    def frames(self) -> int:
+        """[source frames]; 0 too where it cannot be told."""
+    @property
+    def fits(self) -> list[LagFit]:
+        """LagFit, by rising lag; none where the footage is no sequence."""
+    def line(self) -> str:
+        """How the fits compare."""
+
 class CalibrationReport:
     """How a calibration went."""
     @property
@@ -423,6 +455,9 @@ class CalibrationReport:
     @property
     def steps(self) -> list[AdamStep]:
         """AdamStep, of solver 'adam'."""
+    @property
+    def lag(self) -> LagReport:
+        """LagReport, where the footage is a sequence."""
     def brief(self) -> str:
         """One line."""
     def full(self) -> str:
@@ -696,6 +731,9 @@ class Pairing:
     @property
     def offset(self) -> float:
         """By how much the source's clock is late [s]."""
+    @property
+    def lag(self) -> int:
+        """By how many of its frames the source is late beyond that."""
     def line(self) -> str:
         """What happened, in one line."""
 
@@ -1010,6 +1048,21 @@ class Half(Stream):
     def __init__(self, stream: Stream, half: str) -> None:
         """half: left, right, top or bottom."""
 
+def oriented(stream: Stream) -> Stream:
+    """A stream of image files, each turned as its EXIF orientation asks for; another stream as
+    it is.
+    """
+
+def orientation_line(stream: Stream, applied: bool) -> str:
+    """A line where the first file of the stream asks for a turn, or ''. applied: whether it is
+    turned.
+    """
+
+def as_stored(file: bytes) -> bytes:
+    """The bytes of an image file, of a TIFF as if it did not say how its picture is to be
+    turned: OpenCV would do so, which it does with no other.
+    """
+
 def read_times(table: str | PathLike[str], stream: Stream) -> list[float]:
     """Seconds of the frames of a stream from a file of `name timestamp` lines, see
     times_of_table().
@@ -1078,6 +1131,26 @@ def refine_offset(
     are left out. Raises InputError without candidates or times.
     """
 
+class TimeOffset:
+    """What --time-offset says."""
+    @property
+    def automatic(self) -> bool:
+        """To be found from the footage."""
+    @property
+    def seconds(self) -> float:
+        """By which the source's clock is late."""
+    @property
+    def frames(self) -> int:
+        """By how many of its frames the source is late beyond that."""
+
+def parse_time_offset(text: str) -> TimeOffset:
+    """`auto`, seconds (0.1), or source frames (2f). Raises InputError."""
+
+def is_sequence(stream: Stream) -> bool:
+    """Whether frames follow each other: their times are at most a second apart, or one number in
+    their names rises, by one as a rule.
+    """
+
 class Pairs:
     """Two streams, and which of their frames belong together."""
     def __init__(
@@ -1090,16 +1163,19 @@ class Pairs:
         reference_times: str | PathLike[str] | None = None,
         source_times: str | PathLike[str] | None = None,
         estimate: OffsetEstimate | None = None,
+        frame_offset: int = 0,
     ) -> None:
-        """As pair_streams(); time_offset None: estimated. The tables are read by read_times().
-        Nothing else is read, save that an offset to be estimated, unless there is an
-        estimate, needs the frames.
+        """As pair_streams(); time_offset None: estimated; frame_offset: by how many of its
+        frames the source is late beyond that. The tables are read by read_times(). Nothing
+        else is read, save that an offset to be estimated, unless there is an estimate, needs
+        the frames.
         """
     def refine(self, rig: Rig, open_depth: Callable[[list[int]], Any]) -> None:
         """Pairs anew with the offset at which frames register best with the rig.
         open_depth(used): the provider of the depth of these of all references. Without an
         estimated offset the pairs stay as they are, and so they do where the registered
-        frames tell neither around the estimate nor around 0.
+        frames tell neither around the estimate nor around 0. Sequences without times are
+        looked at up to 6 frames either way.
         """
     @property
     def references(self) -> Stream:
@@ -1110,6 +1186,12 @@ class Pairs:
     @property
     def all_references(self) -> Stream:
         """With those that do not."""
+    @property
+    def all_sources(self) -> Stream:
+        """With those that do not."""
+    @property
+    def offset(self) -> TimeOffset:
+        """TimeOffset that they are paired with."""
     @property
     def pairing(self) -> Pairing:
         """Indices into the streams."""
@@ -1141,6 +1223,52 @@ def left_out(count: int, first: str) -> str:
 
 def with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str:
     """The message with the file that the core, which sees arrays only, calls `frame N`."""
+
+def fit_lags(
+    references: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    sources: Mapping[int, Sequence[NDArray[Any] | None]],
+    rig: Rig,
+    options: CalibrationOptions = ...,
+) -> LagReport:
+    """Whether the source is late by whole frames: a LagReport.
+
+    references, depths: a dozen of the frames that rig was fitted to, with options, as
+    calibrate() takes them, spread over the footage. sources: by lag, 0 among them, a list
+    with the source so many frames later than each reference's own, None where the footage has
+    none. At each lag the rig is refitted, and the NEC of the same references compared.
+    """
+
+def look_at_lags(
+    references: Sequence[NDArray[Any]],
+    sources: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    partners: Sequence[int],
+    all_sources: Stream,
+    rig: Rig,
+    options: CalibrationOptions,
+    progress: Callable[[float], object],
+) -> LagReport:
+    """fit_lags() of a dozen of the frames that rig was fitted to, with options.
+
+    partners: the indices of their sources in all_sources, from which those before and after
+    them are read. Where all_sources is no sequence, or the footage is short, nothing is.
+    progress: is called with the share of the frames read.
+    """
+
+def add_lags(
+    result: CalibrationResult, lag: LagReport, offset: TimeOffset, all_sources: Stream
+) -> None:
+    """Puts the report into the result, which is no longer trusted if the source is late beyond
+    offset.
+    """
+
+def frames_later(
+    all_sources: Stream, partners: Sequence[int], lag: int
+) -> tuple[list[int], list[int]]:
+    """Of pairs with these partners in all_sources: those that have one lag frames later, and
+    these partners.
+    """
 
 class Registration:
     """How far a stream is registered, and its totals."""

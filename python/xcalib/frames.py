@@ -25,6 +25,7 @@ from ._core import (
     DecodeError,
     InputError,
     Rig,
+    as_stored,
     display_gray,
     natural_order,
     overlay,
@@ -145,6 +146,8 @@ def decode(path: Path) -> Image:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     data = path.read_bytes()
+    if data.startswith((b"II*\0", b"MM\0*")):
+        data = as_stored(data)
     image = None
     with quiet_opencv(), contextlib.suppress(cv2.error):
         if data and not is_truncated(data):

@@ -49,6 +49,25 @@ struct AdamStep {
     double total = 0.0;  // Eq. (total_loss)
 };
 
+// The fit with the sources some frames later, refitted.
+struct LagFit {
+    int lag = 0;        // that a source is later than its own frame [source frames]
+    int frames = 0;     // of the references looked at, those that have such a source
+    double nec = 0.0;   // mean over them
+    double gain = 0.0;  // NEC of a reference above its own at lag 0, mean over those that have both
+    double error = 0.0;  // of the gain: its standard error
+    Rig rig;             // refitted
+};
+
+// By how much the source is late beside what it was paired with.
+struct LagReport {
+    int frames = 0;            // [source frames]; 0 too where it cannot be told
+    std::vector<LagFit> fits;  // by rising lag; none where the footage is no sequence
+
+    const LagFit& at(int lag) const;  // which must be among them
+    std::string line() const;         // how the fits compare
+};
+
 struct CalibrationReport {
     bool converged = false;
     std::string message;  // one line: why the result is, or is not, to be trusted
@@ -66,6 +85,7 @@ struct CalibrationReport {
     std::vector<LevelReport> levels;
     LensReport lens;
     std::vector<AdamStep> steps;  // of Solver::adam
+    LagReport lag;                // of fit_lags(), where the footage was a sequence
 
     std::string brief() const;  // one line
     std::string full() const;   // a table

@@ -247,6 +247,7 @@ std::string Pairing::line() const {
             " (median gap %.1f ms, source late by %+.4f s); without a partner: %d reference,"
             " %d source frames",
             1e3 * gap, offset, dropped_references, dropped_sources);
+    if (lag != 0) text += format("; source late by %+d of its frames", lag);
     return text;
 }
 
@@ -271,6 +272,7 @@ Pairing pair_times(const std::vector<double>& references, const std::vector<doub
     std::vector<double> gaps;
     auto first = many.begin();
     for (std::size_t i = 0; i < few.size(); ++i) {
+        if (i > 0 && few[i] == few[i - 1]) continue;  // two frames of one moment: one is wrong
         const auto distance = [&](auto at) { return std::abs(*at - few[i]); };
         auto best = std::lower_bound(first, many.end(), few[i]);
         if (best != first && (best == many.end() || distance(best - 1) <= distance(best))) --best;

@@ -83,6 +83,19 @@ Json numbers_of(const Vector& values) {
     return list;
 }
 
+Json json_of(const LagReport& lag) {
+    if (lag.fits.empty()) return nullptr;
+    Json fits = Json::array();
+    for (const LagFit& fit : lag.fits)
+        fits.push_back({{"lag", fit.lag},
+                        {"frames", fit.frames},
+                        {"nec", fit.nec},
+                        {"gain", fit.gain},
+                        {"error", fit.error},
+                        {"rig", json_of(fit.rig)}});
+    return {{"frames", lag.frames}, {"fits", fits}};
+}
+
 std::string text_of(const Json& document) {
     return document.dump(2, ' ', true, Json::error_handler_t::replace);
 }
@@ -106,7 +119,8 @@ Json json_of(const CalibrationReport& report) {
             {"candidates", list_of(report.candidates)},
             {"levels", list_of(report.levels)},
             {"lens", json_of(report.lens)},
-            {"steps", list_of(report.steps)}};
+            {"steps", list_of(report.steps)},
+            {"lag", json_of(report.lag)}};
 }
 
 Json json_of(const Scores& scores) {

@@ -1,5 +1,10 @@
 #include "xcalib/calibration_report.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <stdexcept>
+
 #include "base/format.hpp"
 
 namespace xcalib {
@@ -8,6 +13,28 @@ namespace {
 constexpr double kDegrees = 180 / 3.14159265358979323846;
 
 }  // namespace
+
+const LagFit& LagReport::at(int lag) const {
+    const auto found =
+        std::find_if(fits.begin(), fits.end(), [lag](const LagFit& fit) { return fit.lag == lag; });
+    if (found == fits.end())
+        throw std::out_of_range("lag " + std::to_string(lag) + " was not looked at");
+    return *found;
+}
+
+std::string LagReport::line() const {
+    if (fits.empty()) return "the footage is no sequence, lags were not looked at";
+    const auto best = std::max_element(fits.begin(), fits.end(), [](const auto& a, const auto& b) {
+        return (a.lag ? a.gain : -INFINITY) < (b.lag ? b.gain : -INFINITY);
+    });
+    if (frames == 0)
+        return format("no lag fits better (the best other, %+d: NEC %+.4f +- %.4f)", best->lag,
+                      best->gain, best->error);
+    const LagFit& found = at(frames);
+    return format("the source is %d %s %s (NEC %+.4f +- %.4f over %d frames)", std::abs(frames),
+                  std::abs(frames) == 1 ? "frame" : "frames", frames > 0 ? "late" : "early",
+                  found.gain, found.error, found.frames);
+}
 
 std::string CalibrationReport::brief() const {
     return format(
@@ -29,6 +56,14 @@ std::string CalibrationReport::full() const {
         text += format("%9zu  %6.3f  %5.3f  %7.2f  %7.4f  %5.1f / %5.1f\n", i + 1, c.score,
                        c.correlation, c.overlap, c.refined_nec,
                        c.refined.reference.hfov() * kDegrees, c.refined.source.hfov() * kDegrees);
+    }
+    if (!lag.fits.empty()) {
+        text +=
+            "lags: " + lag.line() + "\nlag [frames]  frames     NEC  gain                 t [m]\n";
+        for (const LagFit& fit : lag.fits)
+            text += format("%+12d  %6d  %.4f  %+.4f +- %.4f  %+8.4f %+8.4f %+8.4f\n", fit.lag,
+                           fit.frames, fit.nec, fit.gain, fit.error, fit.rig.t().x(),
+                           fit.rig.t().y(), fit.rig.t().z());
     }
     text +=
         "level  stage  size       iterations  cost                  NEC     valid  condition   s  "

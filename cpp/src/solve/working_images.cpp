@@ -49,6 +49,13 @@ void for_frame(const char* name, int index, const Work& work) {
 
 float floor_of(const Parts& parts) { return parts.floor ? kEdgeFloor : 0.0f; }
 
+// Fills source `i`, which there must be a place for.
+void prepare_source(const ImageView& source, int i, WorkingImages& images) {
+    images.sources[i] = to_gray(source);
+    if (images.parts.normalization) images.sources[i] = normalize_percentiles(images.sources[i]);
+    images.source_edges[i] = edge_map(images.sources[i], floor_of(images.parts));
+}
+
 }  // namespace
 
 void validate_frames(const std::vector<ImageView>& references,
@@ -122,12 +129,7 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
             if (plan.parts.normalization)
                 images.references[i] = normalize_dark(images.references[i]);
         });
-        for_frame("source", frame, [&] {
-            images.sources[i] = to_gray(sources[frame]);
-            if (plan.parts.normalization)
-                images.sources[i] = normalize_percentiles(images.sources[i]);
-        });
-        images.source_edges[i] = edge_map(images.sources[i], floor);
+        for_frame("source", frame, [&] { prepare_source(sources[frame], i, images); });
         images.reference_edges[i] = edge_map(images.references[i], floor);
         Image depth;
         for_frame("depth", frame, [&] {
@@ -147,6 +149,16 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     });
     images.times->prepare += nanoseconds_since(start);
     return images;
+}
+
+WorkingImages with_sources(const WorkingImages& images, const std::vector<ImageView>& sources,
+                           int num_threads) {
+    const Clock::time_point start = Clock::now();
+    WorkingImages out = images;
+    parallel_each(static_cast<int>(images.size()), num_threads,
+                  [&](int i) { prepare_source(sources[i], i, out); });
+    images.times->prepare += nanoseconds_since(start);
+    return out;
 }
 
 WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) const {

@@ -46,6 +46,10 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<ImageView>& depths,
                                   const std::vector<int>& chosen, const Plan& plan);
 
+// The same references and depths with other sources, one each, prepared as those were.
+WorkingImages with_sources(const WorkingImages& images, const std::vector<ImageView>& sources,
+                           int num_threads);
+
 // Depth without its edges, for the NEC of the finer levels: across an edge, the warp joins two
 // surfaces that the source camera may not see side by side, and the step between them moves with
 // the depth, not with the rig. Coarser levels keep them, since nearly every pixel is near one

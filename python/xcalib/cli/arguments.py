@@ -58,7 +58,13 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
         a["depth_spec"],
         a["depth_scale"],
         Matching(
-            a["pairing"], a["time_offset"], a["max_gap"], a["reference_times"], a["source_times"]
+            a["pairing"],
+            None if a["time_offset"].automatic else a["time_offset"].seconds,
+            a["max_gap"],
+            a["reference_times"],
+            a["source_times"],
+            a["time_offset"].frames,
+            a["exif_orientation"],
         ),
         PlaneDepth(a["camera_height"], a["horizon"], a["far"], a["plane_hfov"], a["plane_roll"]),
         NetworkOptions(

@@ -35,6 +35,9 @@ from .arguments import (
 )
 from .errors import NOT_TRUSTED, stop, warn
 
+LAG_ROUNDS = 2
+"""Times at most that a lag is taken up, each of some frames."""
+
 
 def intrinsics(
     ctx: click.Context, param: click.Parameter, value: str | None
@@ -323,6 +326,15 @@ def command(
             frames, calibration, result.rig, quiet, set_cameras, chosen, warn
         )
         click.echo(f"plane: --horizon {plane.horizon:g} --plane-roll {plane.roll_deg:g}")
+    for _ in range(LAG_ROUNDS):
+        lag = result.report.lag
+        if not lag.frames or frames.offset is None or not frames.offset.automatic:
+            break
+        click.echo(f"clock offset: {lag.line()}, taken up", err=True)
+        frames, chosen = frames.with_lag(lag.frames, chosen)
+        result, chosen = run_calibration(
+            frames, calibration, initial_rig, quiet, set_cameras, chosen, warn, flow
+        )
     save_rig(result.rig, output)
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")
