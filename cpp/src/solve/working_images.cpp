@@ -118,12 +118,12 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     parallel_each(static_cast<int>(count), options.num_threads, [&](int i) {
         const int frame = chosen[i];
         for_frame("reference", frame, [&] {
-            images.references[i] = resize_area(to_gray(references[frame]), width, height);
+            images.references[i] = resize_area(known_gray(references[frame]), width, height);
             if (plan.parts.normalization)
                 images.references[i] = normalize_dark(images.references[i]);
         });
         for_frame("source", frame, [&] {
-            images.sources[i] = to_gray(sources[frame]);
+            images.sources[i] = known_gray(sources[frame]);
             if (plan.parts.normalization)
                 images.sources[i] = normalize_percentiles(images.sources[i]);
         });

@@ -11,7 +11,6 @@ import click
 from .._core import (
     CalibrationOptions,
     Pinhole,
-    Rig,
     _flow_arguments,
     left_out,
     report_document,
@@ -20,17 +19,21 @@ from ..flow import FlowProvider, NetworkFlow
 from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
 from ..pipeline import choose_by_content, run_calibration, save_rig, with_fitted_plane
 from .arguments import (
+    COUNT,
     DEFAULTS,
     SEED,
     WORDS,
+    check_writes,
     colormap_option,
     frames_arguments,
+    load_rig,
     open_frames,
     quiet_option,
     threads_option,
     with_scalar_sources,
 )
 from .errors import NOT_TRUSTED, stop, warn
+from .options import Input, Output
 
 
 def intrinsics(
@@ -64,7 +67,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "-o",
     "--output",
     metavar="RIG",
-    type=click.Path(path_type=Path),
+    type=Output(check_file_writable),
     required=True,
     help="Rig file to write (YAML).",
 )
@@ -72,7 +75,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "--frames",
     "max_frames",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=DEFAULTS.max_frames,
     show_default=True,
     help="Frames to use at most.",
@@ -100,7 +103,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 @click.option(
     "--initial",
     metavar="RIG",
-    type=click.Path(path_type=Path),
+    type=Input(),
     help="Rig file to start from.  [default: none, searched]",
 )
 @click.option(
@@ -179,7 +182,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 @click.option(
     "--working-width",
     metavar="PX",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=DEFAULTS.working_width,
     show_default=True,
     help="Reference width that calibration works at [px].",
@@ -194,7 +197,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "--report",
     "report_file",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=Output(check_file_writable),
     help="Also write the full report (JSON), for `xcalib report`.",
 )
 @quiet_option
@@ -266,11 +269,9 @@ def command(
         if source_intrinsics:
             calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
 
-    initial_rig = Rig.load(initial) if initial else None
+    initial_rig = load_rig(initial) if initial else None
     frames = open_frames(inputs, threads, initial_rig)
-    check_file_writable(output)
-    if report_file:
-        check_file_writable(report_file)
+    check_writes([output, report_file], frames, inputs, initial)
     frames = with_scalar_sources(frames, source_colormap)
 
     indices = None
@@ -299,7 +300,7 @@ def command(
     save_rig(result.rig, output)
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")
-    if report_file:
+    if report_file is not None:
         files = [frames.references.where(index) for index in chosen]
         write_bytes(report_file, report_document(result.report, str(output), files).encode())
         click.echo(f"report: {report_file}")
