@@ -300,7 +300,7 @@ def test_changed_missing_and_damaged_files_are_made_again(
     names = [path.name for path in list_files(out)]
     (out / names[3]).unlink()
     (out / "masks" / names[4]).write_bytes(b"")
-    (out / "masks" / f".{names[5]}.77.partial").write_bytes(b"half")
+    (out / "masks" / f".{names[5]}.0123456789abcdef.partial").write_bytes(b"half")
     journal.write_text(journal.read_text() + '{"frames": {"12')  # as a power cut leaves it
     result = cli(*arguments(scene, out))
     assert f"({FRAMES - 2} from before)" in result.stdout

@@ -16,6 +16,7 @@
 #include "xcalib/rig_file.hpp"
 #include "xcalib/stream/files.hpp"
 #include "xcalib/stream/neighbours.hpp"
+#include "xcalib/stream/outputs.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -175,7 +176,7 @@ void check(const Arguments& a) {
     value_of("--flow", a.flow, flow_arguments());
 }
 
-void run(Arguments a, Console& console) {
+void run(Arguments a, bool has_report, Console& console) {
     check(a);
     CalibrationOptions& options = a.options;
     options.search.mode = value_of<SearchMode>("--search", a.search);
@@ -192,10 +193,11 @@ void run(Arguments a, Console& console) {
     options.validate();
 
     std::optional<Rig> initial;
-    if (!a.initial.empty()) initial = load_rig(a.initial);
+    if (!a.initial.empty()) initial = load_rig(a.initial, console);
     Frames frames = open_frames(a.frames, initial, console);
-    check_file_writable(a.output);
-    if (!a.report.empty()) check_file_writable(a.report);
+    std::vector<Path> writes = {a.output};
+    if (has_report) writes.emplace_back(a.report);
+    check_writes(writes, frames, {a.initial, a.frames.reference_times, a.frames.source_times});
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
 
     const std::vector<int> chosen =
@@ -242,7 +244,7 @@ void run(Arguments a, Console& console) {
     std::vector<std::string> files;
     for (const int index : loaded.indices) files.push_back(frames.references->where(index));
     const std::string document = report_document(result.report, a.output, files);
-    if (!a.report.empty()) {
+    if (has_report) {
         write_file(a.report, document);
         console.line("report: " + a.report);
     }
@@ -292,7 +294,8 @@ void add_calibrate(CLI::App& app, Console& console) {
     add_threads(*command, a.options.num_threads);
     command
         ->add_option("--initial", a.initial, "Rig file to start from.  [default: none, searched]")
-        ->type_name("RIG");
+        ->type_name("RIG")
+        ->check(kNamed);
     command
         ->add_option("--search", a.search,
                      "Global search before refinement: full, local (around the initial rig), off,"
@@ -356,11 +359,13 @@ void add_calibrate(CLI::App& app, Console& console) {
     command->add_flag("--refine-plane", a.refine_plane,
                       "With --depth plane: find the horizon and the roll from the footage (some 17"
                       " quick fits), and print them for `register`.");
-    command->add_option("--report", a.report, "Also write the full report (JSON).")
-        ->type_name("FILE");
+    CLI::Option* report =
+        command->add_option("--report", a.report, "Also write the full report (JSON).")
+            ->type_name("FILE");
     command->add_flag("--quiet", console.quiet, "No progress.");
     command->fallthrough();
-    command->callback([arguments, &console] { run(*arguments, console); });
+    command->callback(
+        [arguments, report, &console] { run(*arguments, !report->empty(), console); });
 }
 
 }  // namespace xcalib::cli

@@ -22,6 +22,12 @@ class NotTrusted : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+// Whoever read our output has gone: nothing is to be said any more.
+class ClosedPipe : public std::runtime_error {
+   public:
+    ClosedPipe() : std::runtime_error("nobody reads stdout") {}
+};
+
 class Console {
    public:
     bool json = false;
@@ -32,7 +38,7 @@ class Console {
     void event(const std::string& name, Json fields);
     void note(const std::string& text);
     void warn(const std::string& text);
-    void error(int code, const std::string& text);
+    void error(int code, const std::string& text) noexcept;
     // `fraction` of `stage`, (0, 1]. `detail`: more of it, for people; where there is no terminal,
     // a line now and then.
     void show(const std::string& stage, double fraction, const std::string& detail = "");

@@ -2,10 +2,17 @@
 
 #include "depth.hpp"
 #include "footage.hpp"
+#include "xcalib/rig_file.hpp"
 #include "xcalib/stream/oriented.hpp"
 #include "xcalib/stream/pairs.hpp"
 
 namespace xcalib::cli {
+
+Rig load_rig(const std::string& file, Console& console) {
+    const Rig rig = xcalib::load_rig(file);
+    for (const std::string& line : implausible(rig)) console.warn(file + ": " + line);
+    return rig;
+}
 
 Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& rig,
                    Console& console) {

@@ -4,6 +4,7 @@
 
 #include "xcalib/error.hpp"
 #include "xcalib/footage/pairing.hpp"
+#include "xcalib/threads.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -13,7 +14,8 @@ void add_depth(CLI::App& command, DepthArguments& arguments) {
         .add_option("--depth", arguments.spec,
                     "Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr"
                     " in m; 0 unknown), or `plane` for a flat road.")
-        ->type_name("DEPTH");
+        ->type_name("DEPTH")
+        ->check(kNamed);
     command.add_option("--depth-scale", arguments.scale, "Metres per count of 16-bit PNG depth.")
         ->type_name("M")
         ->default_str("1/256");
@@ -73,11 +75,13 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
     command
         .add_option("--reference-times", arguments.reference_times,
                     "Times of the reference frames: lines `name timestamp`.  [default: their own]")
-        ->type_name("FILE");
+        ->type_name("FILE")
+        ->check(kNamed);
     command
         .add_option("--source-times", arguments.source_times,
                     "Times of the source frames: lines `name timestamp`.  [default: their own]")
-        ->type_name("FILE");
+        ->type_name("FILE")
+        ->check(kNamed);
     command
         .add_option("--exif-orientation", arguments.exif_orientation,
                     "Image files that say how their picture is to be turned: take pixels as they"
@@ -89,9 +93,15 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
 
 }  // namespace
 
+const CLI::Validator kNamed(
+    [](std::string& name) {
+        return name.empty() ? "the name is empty, expected a file or a folder" : std::string();
+    },
+    "", "named");
+
 void add_frames(CLI::App& command, FrameArguments& arguments) {
-    command.add_option("REFERENCE", arguments.reference)->required();
-    command.add_option("SOURCE", arguments.source)->required();
+    command.add_option("REFERENCE", arguments.reference)->required()->check(kNamed);
+    command.add_option("SOURCE", arguments.source)->required()->check(kNamed);
     add_depth(command, arguments.depth);
     add_footage(command, arguments);
 }
@@ -99,7 +109,7 @@ void add_frames(CLI::App& command, FrameArguments& arguments) {
 void add_threads(CLI::App& command, int& threads) {
     command.add_option("--threads", threads, "Threads to use; 0 means all cores.")
         ->type_name("N")
-        ->check(CLI::NonNegativeNumber)
+        ->check(CLI::Range(0, kMaxThreads))
         ->capture_default_str();
 }
 

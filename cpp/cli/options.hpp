@@ -11,7 +11,8 @@
 
 namespace CLI {
 class App;
-}
+class Validator;
+}  // namespace CLI
 
 namespace xcalib::cli {
 
@@ -35,6 +36,8 @@ struct FrameArguments {
 
 // REFERENCE, SOURCE and how they and their depth are read.
 void add_frames(CLI::App& command, FrameArguments& arguments);
+// Refuses an empty name, which stands for a folder elsewhere: for a variable that is not set.
+extern const CLI::Validator kNamed;
 void add_threads(CLI::App& command, int& threads);
 void add_colormap(CLI::App& command, std::string& colormap);
 

@@ -7,6 +7,7 @@
 
 #include "xcalib/footage/exif.hpp"
 #include "xcalib/stream/files.hpp"
+#include "xcalib/stream/tiff.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -89,17 +90,21 @@ cv::Mat decode(const Path& file) {
             pixels.release();
         }
     }
+    const std::string type = pixels.empty() ? tiff_pixel_type(data) : "";
+    if (!type.empty() && type != "uint8" && type != "uint16" && type != "float32")
+        throw InputError(file.string() + ": pixels are " + type +
+                         ", expected uint8, uint16 or float32");
     if (pixels.empty())
         throw DecodeError(file.string() + ": cannot decode " + std::to_string(data.size()) +
                           " bytes, truncated or not an image");
     return pixels;
 }
 
-void write_image(const Path& file, const ImageView& image) {
+std::string encode_image(const Path& file, const ImageView& image) {
     std::vector<std::uint8_t> data;
     if (!cv::imencode(file.extension().string(), mat_of(image), data))
         throw std::runtime_error(file.string() + ": cannot encode " + size_text(image));
-    write_file(file, {reinterpret_cast<const char*>(data.data()), data.size()});
+    return {data.begin(), data.end()};
 }
 
 }  // namespace xcalib::cli

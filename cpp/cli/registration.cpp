@@ -61,7 +61,8 @@ Registration register_files(const RegisterArguments& arguments, const Frames& fr
     FfmpegCodecs codecs;
     return register_frames(
         frames, rig, arguments.output, arguments.options, "xcalib-cli", inputs_of(arguments.frames),
-        codecs, [&](const Registration& now) {
+        {arguments.rig, arguments.frames.reference_times, arguments.frames.source_times}, codecs,
+        [&](const Registration& now) {
             console.show("registering", static_cast<double>(now.earlier + now.made) / now.frames,
                          now.line());
         });

@@ -55,6 +55,7 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_pairs(m);
     xcalib::bind_frames(m);
     xcalib::bind_lags(m);
+    xcalib::bind_files(m);
     xcalib::bind_register_frames(m);
 
     xcalib::bind_evaluate(m);

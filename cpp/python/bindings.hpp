@@ -18,6 +18,7 @@ void bind_flow(pybind11::module_& m);
 
 void bind_pairing(pybind11::module_& m);
 void bind_clock_offset(pybind11::module_& m);
+void bind_files(pybind11::module_& m);
 void bind_fingerprint(pybind11::module_& m);
 void bind_choose(pybind11::module_& m);
 void bind_false_colour(pybind11::module_& m);

@@ -1268,6 +1268,57 @@ def frames_later(
 ) -> tuple[list[int], list[int]]:
     """Of pairs with these partners in all_sources: those that have one lag frames later, and
     these partners.
+def max_threads() -> int:
+    """How many threads may be asked for."""
+
+def implausible(rig: Rig) -> list[str]:
+    """What of a rig is so unlikely that another unit or a slip may be behind it, a line each."""
+
+def read_text(file: str | PathLike[str]) -> str:
+    """A text that people write: InputError where it is no file, larger than 1 MiB, or not UTF-8."""
+
+def read_file(file: str | PathLike[str]) -> bytes:
+    """The bytes of a file: InputError where it is none, as a pipe, or larger than 1 GiB."""
+
+def read_npy(file: str | PathLike[str]) -> NDArray[float32]:
+    """(h, w) float32 of a .npy file of one channel of floats; DecodeError where it is none."""
+
+def tiff_pixel_type(data: bytes) -> str:
+    """The type of a TIFF's pixels, as numpy calls it; '' where the data does not say."""
+
+def write_file(file: str | PathLike[str], data: bytes) -> None:
+    """Writes bytes: under the file's name only when they are complete and on the disk.
+
+    Its folder is made. What stands there is replaced; a link is followed; a pipe or a device
+    is written to as it is. Raises InputError where that cannot be.
+    """
+
+def keep_file(partial: str | PathLike[str], file: str | PathLike[str]) -> None:
+    """Gives a complete file, first made sure to be on the disk, its name."""
+
+def list_files(folder: str | PathLike[str], suffixes: Sequence[str]) -> list[Path]:
+    """Files of a folder with one of the suffixes (any case), in natural order, at least one."""
+
+def check_folder_writable(folder: str | PathLike[str]) -> None:
+    """Raises InputError now, before long work, if nothing can be written below a folder, which
+    need not exist, and is not made.
+    """
+
+def check_file_writable(file: str | PathLike[str]) -> None:
+    """Raises InputError now, before long work, if a file cannot be written."""
+
+def check_output_writable(output: str | PathLike[str]) -> None:
+    """Raises InputError now if a folder or a video, as register writes, cannot be."""
+
+def check_writes(
+    files: Sequence[str | PathLike[str]],
+    references: Stream,
+    sources: Stream,
+    depth: Any,
+    other_reads: Sequence[str | PathLike[str]],
+) -> None:
+    """Raises InputError if a run on these frames cannot write to all of the files, reads one of
+    them, or would write one twice.
     """
 
 class Registration:
@@ -1308,6 +1359,7 @@ def register_frames(
     overwrite: bool,
     part_frames: int,
     inputs: Sequence[tuple[str, str]],
+    other_reads: Sequence[str | PathLike[str]],
     codecs: object,
     progress: Callable[[Registration], object],
     hold_interrupts: bool,
@@ -1316,9 +1368,10 @@ def register_frames(
 
     registrar: with a rig and options to register by; its threads are those of the whole run.
     part_frames: of a video, that a run that is killed can lose at most. inputs: (name, text)
-    of all that the frames were opened with; an output of others is refused. codecs: has
-    write_image(file, image), encoder_name(), Encoder(part, target, first, rate) and
-    join(parts, target, rate, check). progress(registration) is called in this thread after
-    frames, and a few times a second. hold_interrupts: in the main thread, SIGINT and SIGTERM
-    end the run between two frames, by KeyboardInterrupt.
+    of all that the frames were opened with; an output of others is refused. other_reads:
+    files that were read besides those of the frames; nothing that is read is written to.
+    codecs: has encode_image(file, image), which returns bytes, encoder_name(), Encoder(file,
+    target, first, rate) and join(parts, file, target, rate, check). progress(registration) is
+    called in this thread after frames, and a few times a second. hold_interrupts: in the main
+    thread, SIGINT and SIGTERM end the run between two frames, by KeyboardInterrupt.
     """

@@ -50,18 +50,6 @@ cv::Mat as_mat(const EdgeMap& field) {
 // -- One frame ------------------------------------------------------------------------------------
 
 template <class T>
-bool any_not_finite(const ImageView& image) {
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width * image.channels; ++x)
-            if (!std::isfinite(image.row<T>(y)[x])) return true;
-    return false;
-}
-
-bool not_finite(const ImageView& image) {
-    return image.type == PixelType::f32 && any_not_finite<float>(image);
-}
-
-template <class T>
 double share_at_end(const ImageView& image, bool both) {
     const int channel = image.channels == 3 ? 1 : 0;
     long top = 0, bottom = 0;
@@ -453,16 +441,19 @@ Candidate look_at(int index, const ImageView& reference, const ImageView& source
                   const ImageView* depth) {
     Candidate found;
     found.index = index;
-    for (const auto& [name, image] : {std::pair{"reference", &reference}, {"source", &source}})
-        if (not_finite(*image)) {
-            found.reason = std::string(name) + " has pixels that are not finite";
+    Image dark, bright;
+    for (const auto& [name, image, gray] :
+         {std::tuple{"reference", &reference, &dark}, {"source", &source, &bright}})
+        try {
+            *gray = known_gray(*image);
+        } catch (const std::invalid_argument& error) {
+            found.reason = std::string(name) + ": " + error.what();
             return found;
         }
-    Image dark = to_gray(reference);
     // As the objective does, for the edges of a night image lie in its darkest tenth.
     if (reference.type != PixelType::f32)
         for (float& value : dark.pixels) value = std::log1p(20 * value);
-    const Gradient gradients[2] = {gradient(dark), gradient(to_gray(source))};
+    const Gradient gradients[2] = {gradient(dark), gradient(bright)};
     for (const int camera : {0, 1}) {
         found.edges[camera] = contrast(gradients[camera]);
         found.fields[camera] = edge_field(gradients[camera]);

@@ -1,20 +1,17 @@
 #include "xcalib/rig_file.hpp"
 
-#include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <initializer_list>
-#include <iterator>
 #include <locale>
 #include <sstream>
 #include <stdexcept>
-#include <system_error>
+
+#include "base/format.hpp"
+#include "base/whole_file.hpp"
+#include "rig_file/document.hpp"
 
 namespace xcalib {
 namespace {
@@ -43,10 +40,15 @@ class Section {
             bool known = false;
             for (const auto& list : {keys, optional})
                 for (const char* expected : list) known = known || key == expected;
-            if (!known) reject(path, "unknown field '" + key + "' in " + name_);
+            if (!known)
+                reject(path, "unknown field '" + quoted(key) + "' in " + name_ + ", expected " +
+                                 joined(keys) + (optional.size() ? ", and if needed " : "") +
+                                 joined(optional) + "; notes go behind a #");
         }
         for (const char* key : keys)
-            if (!node[key]) reject(path, std::string("missing field '") + key + "' in " + name_);
+            if (!node[key])
+                reject(path, std::string("missing field '") + key + "' in " + name_ +
+                                 ", expected " + joined(keys));
     }
 
     YAML::Node node(const char* key) const { return node_[key]; }
@@ -60,8 +62,9 @@ class Section {
         int value = 0;
         const std::string text = node_[key].IsScalar() ? node_[key].Scalar() : "";
         const char* const end = text.data() + text.size();
-        if (std::from_chars(text.data(), end, value).ptr != end || value < 1)
-            fail(key, scalar(node_[key]), "a whole number of px, at least 1");
+        const auto [stopped, error] = std::from_chars(text.data(), end, value);
+        if (stopped != end || error != std::errc() || value < 1)
+            fail(key, scalar(node_[key]), "a whole number of px, at least 1, as in 640");
         return value;
     }
 
@@ -90,14 +93,20 @@ class Section {
 
    private:
     static std::string scalar(const YAML::Node& node) {
-        return node.IsScalar() ? node.Scalar() : "(not a single value)";
+        return node.IsScalar() ? quoted(node.Scalar()) : "(not a single value)";
+    }
+    static std::string joined(const std::initializer_list<const char*>& names) {
+        std::string text;
+        for (const char* name : names) text += (text.empty() ? "" : ", ") + std::string(name);
+        return text;
     }
     double number(const char* key, const YAML::Node& node) const {
         double value = 0;
         const std::string text = node.IsScalar() ? node.Scalar() : "";
         const char* const end = text.data() + text.size();
-        if (std::from_chars(text.data(), end, value).ptr != end || text.empty() ||
-            !std::isfinite(value))
+        const auto [stopped, error] = std::from_chars(text.data(), end, value);
+        // Of a number that is too large or too small there is an error, and no value.
+        if (stopped != end || error != std::errc() || !std::isfinite(value))
             fail(key, scalar(node), "a finite number");
         return value;
     }
@@ -133,6 +142,18 @@ Pinhole read_camera(const std::string& path, const char* name, const YAML::Node&
     if (const YAML::Node lens = section.node("lens"))
         camera.lens = read_lens(path, std::string(name) + ".lens", lens);
     return camera;
+}
+
+// Files written by hand, or with few digits, are off by more than rounding.
+Eigen::Quaterniond unit_quaternion(const Section& pose, const std::vector<double>& wxyz) {
+    Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+    const double off = std::abs(q.norm() - 1);
+    if (!(off <= 1e-3))
+        pose.fail("quaternion_wxyz", "of length " + text_of(q.norm()),
+                  "w, x, y, z of length 1, to within 0.001");
+    // What we have written reads back bit by bit.
+    if (off > 1e-12) q.normalize();
+    return q;
 }
 
 void write_camera(std::ostream& out, const char* name, const Pinhole& camera) {
@@ -173,7 +194,7 @@ Rig parse_rig(const std::string& path, const YAML::Node& root) {
     Rig rig;
     rig.reference = read_camera(path, "reference", file.node("reference"));
     rig.source = read_camera(path, "source", file.node("source"));
-    rig.source_from_reference.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    rig.source_from_reference.rotation = unit_quaternion(pose, q);
     rig.source_from_reference.translation = Eigen::Vector3d(t[0], t[1], t[2]);
     if (const YAML::Node node = file.node("relative_depth")) {
         const Section relative(path, "relative_depth", node, {"scale", "shift"});
@@ -195,17 +216,11 @@ Rig parse_rig(const std::string& path, const YAML::Node& root) {
 }  // namespace
 
 Rig load_rig(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    if (!in) throw std::system_error(errno ? errno : EIO, std::generic_category(), path);
-    if (std::filesystem::is_directory(path))  // opens, but cannot be read
-        throw std::system_error(EISDIR, std::generic_category(), path);
-    const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    const YAML::Node root = load_document(path);
     try {
-        return parse_rig(path, YAML::Load(text));
+        return parse_rig(path, root);
     } catch (const YAML::Exception& error) {
-        std::string what = error.what();
-        std::replace(what.begin(), what.end(), '\n', ' ');
-        reject(path, "not a YAML rig file: " + what);
+        reject(path, "not a YAML rig file: " + quoted(error.what()));
     }
 }
 
@@ -228,21 +243,35 @@ void save_rig(const Rig& rig, const std::string& path) {
         out << "relative_depth:\n"
             << "  scale: " << text_of(rig.relative_depth->scale) << "\n"
             << "  shift: " << text_of(rig.relative_depth->shift) << "\n";
-    const std::string beside = path + ".part" + std::to_string(::getpid());
-    {
-        std::ofstream file(beside, std::ios::binary);
-        if (!(file << out.str() << std::flush)) {
-            const int code = errno ? errno : EIO;
-            file.close();
-            std::remove(beside.c_str());
-            throw std::system_error(code, std::generic_category(), path);
+    write_whole(path, out.str());
+}
+
+std::vector<std::string> implausible(const Rig& rig) {
+    std::vector<std::string> lines;
+    const auto say = [&](const std::string& what, double value, const std::string& why) {
+        lines.push_back(what + " = " + text_of(value) + " is not plausible: " + why);
+    };
+    const auto check = [&](const std::string& name, const Pinhole& camera) {
+        const double sides[] = {double(camera.width), double(camera.height)};
+        const double centres[] = {camera.cx, camera.cy}, focals[] = {camera.fx, camera.fy};
+        for (const int axis : {0, 1}) {
+            const std::string side = format("%g px", sides[axis]);
+            if (!(centres[axis] > -sides[axis] && centres[axis] < 2 * sides[axis]))
+                say(name + (axis ? ".cy" : ".cx"), centres[axis],
+                    "it lies far outside of the image, of " + side);
+            if (!(focals[axis] > sides[axis] / 20 && focals[axis] < 100 * sides[axis]))
+                say(name + (axis ? ".fy" : ".fx"), focals[axis],
+                    "it is in px, for an image of " + side);
         }
-    }
-    if (std::rename(beside.c_str(), path.c_str()) != 0) {
-        const int code = errno;
-        std::remove(beside.c_str());
-        throw std::system_error(code, std::generic_category(), path);
-    }
+        if (!(std::abs(camera.skew) < 0.1 * camera.fx))
+            say(name + ".skew", camera.skew, "the axes of a sensor are square to each other");
+    };
+    check("reference", rig.reference);
+    check("source", rig.source);
+    if (!(rig.t().norm() < 10))
+        say("the length of translation_m", rig.t().norm(),
+            "it is in metres, and rigs are smaller; was it in millimetres?");
+    return lines;
 }
 
 }  // namespace xcalib

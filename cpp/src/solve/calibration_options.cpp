@@ -4,6 +4,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "xcalib/threads.hpp"
+
 namespace xcalib {
 namespace {
 
@@ -18,7 +20,8 @@ void require(bool ok, const char* field, double value, const char* expected) {
 
 void CalibrationOptions::validate() const {
     require(max_frames >= 1, "max_frames", max_frames, "at least 1");
-    require(num_threads >= 0, "num_threads", num_threads, "0 (every core) or more");
+    require(num_threads >= 0 && num_threads <= kMaxThreads, "num_threads", num_threads,
+            "0 (every core) to 1024");
     require(working_width >= 64, "working_width", working_width, "at least 64 px");
     require(max_iterations >= 1, "max_iterations", max_iterations, "at least 1");
     require(std::isfinite(prior_weight) && prior_weight >= 0, "prior_weight", prior_weight,

@@ -51,7 +51,7 @@ float floor_of(const Parts& parts) { return parts.floor ? kEdgeFloor : 0.0f; }
 
 // Fills source `i`, which there must be a place for.
 void prepare_source(const ImageView& source, int i, WorkingImages& images) {
-    images.sources[i] = to_gray(source);
+    images.sources[i] = known_gray(source);
     if (images.parts.normalization) images.sources[i] = normalize_percentiles(images.sources[i]);
     images.source_edges[i] = edge_map(images.sources[i], floor_of(images.parts));
 }
@@ -125,7 +125,7 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     parallel_each(static_cast<int>(count), options.num_threads, [&](int i) {
         const int frame = chosen[i];
         for_frame("reference", frame, [&] {
-            images.references[i] = resize_area(to_gray(references[frame]), width, height);
+            images.references[i] = resize_area(known_gray(references[frame]), width, height);
             if (plan.parts.normalization)
                 images.references[i] = normalize_dark(images.references[i]);
         });

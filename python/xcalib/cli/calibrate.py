@@ -13,7 +13,6 @@ from .._core import (
     CalibrationOptions,
     Lens,
     Pinhole,
-    Rig,
     _flow_arguments,
     left_out,
     report_document,
@@ -23,17 +22,21 @@ from ..footage import lens_of_topic
 from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
 from ..pipeline import choose_by_content, run_calibration, save_rig, with_fitted_plane
 from .arguments import (
+    COUNT,
     DEFAULTS,
     SEED,
     WORDS,
+    check_writes,
     colormap_option,
     frames_arguments,
+    load_rig,
     open_frames,
     quiet_option,
     threads_option,
     with_scalar_sources,
 )
 from .errors import NOT_TRUSTED, stop, warn
+from .options import Input, Output
 
 LAG_ROUNDS = 2
 """Times at most that a lag is taken up, each of some frames."""
@@ -82,7 +85,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "-o",
     "--output",
     metavar="RIG",
-    type=click.Path(path_type=Path),
+    type=Output(check_file_writable),
     required=True,
     help="Rig file to write (YAML).",
 )
@@ -90,7 +93,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "--frames",
     "max_frames",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=DEFAULTS.max_frames,
     show_default=True,
     help="Frames to use at most.",
@@ -118,7 +121,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 @click.option(
     "--initial",
     metavar="RIG",
-    type=click.Path(path_type=Path),
+    type=Input(),
     help="Rig file to start from.  [default: none, searched]",
 )
 @click.option(
@@ -199,7 +202,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 @click.option(
     "--working-width",
     metavar="PX",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=DEFAULTS.working_width,
     show_default=True,
     help="Reference width that calibration works at [px].",
@@ -214,7 +217,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "--report",
     "report_file",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=Output(check_file_writable),
     help="Also write the full report (JSON), for `xcalib report`.",
 )
 @quiet_option
@@ -296,11 +299,9 @@ def command(
                 *size_of(source), *source_intrinsics, lens=lens or Lens()
             )
 
-    initial_rig = Rig.load(initial) if initial else None
+    initial_rig = load_rig(initial) if initial else None
     frames = open_frames(inputs, threads, initial_rig)
-    check_file_writable(output)
-    if report_file:
-        check_file_writable(report_file)
+    check_writes([output, report_file], frames, inputs, initial)
     frames = with_scalar_sources(frames, source_colormap)
 
     indices = None
@@ -338,7 +339,7 @@ def command(
     save_rig(result.rig, output)
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")
-    if report_file:
+    if report_file is not None:
         files = [frames.references.where(index) for index in chosen]
         write_bytes(report_file, report_document(result.report, str(output), files).encode())
         click.echo(f"report: {report_file}")
