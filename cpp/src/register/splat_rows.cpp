@@ -44,8 +44,7 @@ HWY_INLINE void splat(const CellGrid& grid, Float depth, const Points& p,
 #if HWY_TARGET != HWY_SCALAR
 // How far apart a vector's neighbours are, in cells: [1/2, 1], and 1 where that is not so.
 HWY_INLINE float step_of(Float u) {
-    const float step =
-        (hn::ExtractLane(u, kLanes - 1) - hn::ExtractLane(u, 0)) / static_cast<float>(kLanes - 1);
+    const float step = (hn::ExtractLane(u, kLanes - 1) - hn::GetLane(u)) * (1.0f / (kLanes - 1));
     return step >= 0.5f && step < 1 ? step : 1;
 }
 
@@ -56,7 +55,7 @@ HWY_INLINE Int cell_by_cell(Int near, float step, float part) {
     const IntTag di;
     const Float border = hn::Sub(hn::Iota(d, 0.0f), hn::Set(d, part));
     const Float last = set(kLanes - 1.0);
-    const Float lane = hn::Mul(hn::Add(border, set(0.5)), set(1.0 / step));
+    const Float lane = hn::Mul(hn::Add(border, set(0.5)), hn::Set(d, 1.0f / step));
     const Int index = to_integer(hn::Min(hn::Max(lane, hn::Zero(d)), last));
     const Int chosen = hn::TableLookupLanes(near, hn::IndicesFromVec(di, index));
     const Mask reached = hn::Le(border, hn::Mul(last, hn::Set(d, step)));
@@ -85,7 +84,7 @@ HWY_INLINE Vectors splat_together(const CellGrid& grid, const AnyRow& row, const
         else p = project<false>(row.straight, depth, along);
         // Where lenses bend, neighbours are often less than a cell apart.
         const float step = bends ? step_of(p.u) : 1;
-        const Float start = hn::Sub(p.u, hn::Mul(lane, set(double(step))));
+        const Float start = hn::Sub(p.u, hn::Mul(lane, hn::Set(d, step)));
         u[i] = hn::ExtractLane(start, kLanes / 2);
         v[i] = hn::ExtractLane(p.v, kLanes / 2);
         const Float apart =

@@ -111,14 +111,33 @@ HWY_INLINE void locate(const RowsTask& task, const AnyRow& row, const DepthRow& 
     }
 }
 
+// By how many rows from `row`, where a vector's first point lies, a window of some rows begins: one
+// up if some point lies above, and in `last` at the most.
+HWY_INLINE int first_row(int row, bool above, int last) {
+    return std::clamp(above ? row - 1 : row, 0, last) - row;
+}
+
+// What is nearest in the cells of a window, at `index`.
+HWY_INLINE Int nearest_in_window(const CellGrid& grid, const Nearness* from, Int index) {
+    const IntTag di;
+    const hn::Repartition<Nearness, IntTag> pairs;
+    const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + grid.step()));
+    const Int both = hn::TableLookupLanes(
+        hn::BitCast(di, nearest),
+        hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
+    return hn::IfThenElse(hn::TestBit(index, set(1)),
+                          hn::And(both, set(static_cast<int>(0xffff0000))),
+                          hn::ShiftLeft<16>(both));
+}
+
 // Marks what is hidden of vectors of which all points lie within the source.
 template <class T, int kChannels>
 HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, Stretch& stretch,
                             T* out, std::uint8_t* mask) {
     const FloatTag d;
     const IntTag di;
-    const hn::Repartition<Nearness, IntTag> pairs;
     const CellGrid& grid = *task.grid;
+    const bool bends = task.projector->bends();
     constexpr int kWindow = 2 * kLanes, kBefore = kWindow / 8;
     stretch.cells.place<0>(kBefore, std::max(0, grid.width - kBefore), grid.height - 1, 1,
                            grid.width);
@@ -130,17 +149,22 @@ HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, St
         const Int apart =
             hn::Or(hn::Xor(y, set(stretch.cells.y[i])), hn::AndNot(set(kWindow - 1), index));
         const Nearness* from = task.cells + stretch.cells.offset[i];
-        const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + grid.step()));
-        const Int both = hn::TableLookupLanes(
-            hn::BitCast(di, nearest),
-            hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
-        const Int chosen = hn::IfThenElse(hn::TestBit(index, set(1)),
-                                          hn::And(both, set(static_cast<int>(0xffff0000))),
-                                          hn::ShiftLeft<16>(both));
-        Float nearest_there = hn::BitCast(d, chosen);
+        Float nearest_there = hn::BitCast(d, nearest_in_window(grid, from, index));
         if (!none(apart)) {
             if (!((vectors >> i) & 1)) continue;
-            nearest_there = nearest_in(grid, task.cells, hn::BitCast(d, x), hn::BitCast(d, y));
+            // Where a lens bends rows, points often come into the next one.
+            const Int below = hn::Sub(y, set(stretch.cells.y[i]));
+            const int moved =
+                first_row(stretch.cells.y[i] - kLargeBits,
+                          !hn::AllFalse(di, hn::Lt(below, hn::Zero(di))), grid.height - 2);
+            const Int row = hn::Sub(below, set(moved));
+            if (bends && none(hn::Or(hn::AndNot(set(1), row), hn::AndNot(set(kWindow - 1), index))))
+                nearest_there = hn::BitCast(
+                    d,
+                    hn::IfThenElse(hn::Ne(row, hn::Zero(di)),
+                                   nearest_in_window(grid, from + (moved + 1) * grid.width, index),
+                                   nearest_in_window(grid, from + moved * grid.width, index)));
+            else nearest_there = nearest_in(grid, task.cells, hn::BitCast(d, x), hn::BitCast(d, y));
         }
         const Mask behind = is_behind(grid, nearest_there, hn::Load(d, vector.inverse_z));
         if (hn::AllFalse(d, behind)) continue;
@@ -175,6 +199,37 @@ HWY_INLINE Vectors sample_windows(const Source& source, int count, Stretch& stre
         others |= Vectors{!none(apart)} << i;
         store(interpolate_in_window<T, reach>(source, windows.offset[i], index,
                                               hn::Load(d, vector.a), hn::Load(d, vector.b)),
+              out + i * kLanes);
+        hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
+    }
+    return others;
+}
+
+// The same of some of the vectors, in three rows of the source: where a lens bends rows, their
+// points often come into the next one.
+template <class T, Reach reach>
+HWY_INLINE Vectors sample_windows_bent(const Source& source, Vectors vectors,
+                                       const Stretch& stretch, T* out, std::uint8_t* mask) {
+    if (source.height < 3) return vectors;
+    const FloatTag d;
+    const IntTag di;
+    constexpr int kWindow = window<T, reach>();
+    const Windows& windows = stretch.source;
+    Vectors others = 0;
+    for (; vectors; vectors &= vectors - 1) {
+        const int i = first_of(vectors);
+        const UsualVector& vector = stretch.vectors[i];
+        const Int x = hn::BitCast(di, hn::Load(d, vector.x));
+        const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
+        const int moved = first_row(windows.y[i] - kLargeBits,
+                                    !hn::AllFalse(di, hn::Lt(y, hn::Zero(di))), source.height - 3);
+        const Int index = hn::Sub(x, set(windows.x[i])), row = hn::Sub(y, set(moved));
+        const Int apart = hn::Or(hn::AndNot(set(1), row), hn::AndNot(set(kWindow - 1), index));
+        others |= Vectors{!none(apart)} << i;
+        const int offset = windows.offset[i] + moved * static_cast<int>(source.row_bytes);
+        store(interpolate_in_three<T, reach>(source, offset, index,
+                                             hn::RebindMask(d, hn::Ne(row, hn::Zero(di))),
+                                             hn::Load(d, vector.a), hn::Load(d, vector.b)),
               out + i * kLanes);
         hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
     }
@@ -248,8 +303,7 @@ HWY_INLINE Vectors sample_fixed(const Source& source, int count, Stretch& stretc
     return others;
 }
 
-// The same of some of the vectors, in three rows of the source: where a lens bends rows, their
-// points often come into the next one.
+// As sample_windows_bent.
 HWY_INLINE Vectors sample_fixed_bent(const Source& source, Vectors vectors, const Stretch& stretch,
                                      std::uint8_t* out, std::uint8_t* mask) {
     if (source.height < 3) return vectors;
@@ -262,10 +316,8 @@ HWY_INLINE Vectors sample_fixed_bent(const Source& source, Vectors vectors, cons
         const UsualVector& vector = stretch.vectors[i];
         const Int x = hn::Sub(hn::BitCast(di, hn::Load(d, vector.x)), set(windows.x[i]));
         const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
-        // The window has begun in the row of the first point.
-        const int row = (windows.y[i] - kLargeBits) >> kFixedBits;
-        const int above = hn::AllFalse(di, hn::Lt(y, hn::Zero(di))) ? 0 : 1;
-        const int moved = std::clamp(row - above, 0, source.height - 3) - row;
+        const int moved = first_row((windows.y[i] - kLargeBits) >> kFixedBits,
+                                    !hn::AllFalse(di, hn::Lt(y, hn::Zero(di))), source.height - 3);
         const bool inside = interpolate_fixed<2>(
             source, windows.offset[i] + moved * static_cast<int>(source.row_bytes), x,
             hn::Sub(y, set(moved * (1 << kFixedBits))), out + i * kLanes);
@@ -297,6 +349,13 @@ HWY_INLINE void locate_any(const RowsTask& task, const AnyRow& row, const DepthR
                                          stretch);
 }
 
+template <class T, Reach reach>
+HWY_INLINE Vectors sample_in(const Source& source, int count, bool bends, Stretch& stretch, T* out,
+                             std::uint8_t* mask) {
+    const Vectors others = sample_windows<T, reach>(source, count, stretch, out, mask);
+    return bends ? sample_windows_bent<T, reach>(source, others, stretch, out, mask) : others;
+}
+
 // Locates vectors of a row, `count` from pixel `begin` on, and samples them. Returns those of which
 // some points lie outside the source, or nowhere.
 template <class T, int kChannels, bool with_cells>
@@ -320,9 +379,9 @@ HWY_INLINE Vectors sample_stretch(const RowsTask& task, const Source& source, Re
     locate_any<false, with_cells>(task, row.exact, depths, y, begin, count, to, kBytes, stretch);
     if constexpr (kChannels == 1) {
         if (reach == Reach::one)
-            others = sample_windows<T, Reach::one>(source, count, stretch, out, mask);
+            others = sample_in<T, Reach::one>(source, count, row.exact.bends, stretch, out, mask);
         else if (reach == Reach::two)
-            others = sample_windows<T, Reach::two>(source, count, stretch, out, mask);
+            others = sample_in<T, Reach::two>(source, count, row.exact.bends, stretch, out, mask);
     }
     return gather<T, kChannels, false>(source, others, stretch, out, mask);
 }
