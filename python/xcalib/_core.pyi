@@ -310,8 +310,9 @@ class LagFit:
     def frames(self) -> int:
         """References that have such a source."""
     @property
-    def nec(self) -> float:
-        """Mean over them."""
+    def factor(self) -> int: ...
+    @property
+    def nec(self) -> float: ...
     @property
     def gain(self) -> float:
         """NEC of a reference above its own at lag 0, mean over those that have both."""
@@ -327,6 +328,8 @@ class LagReport:
     @property
     def frames(self) -> int:
         """[source frames]; 0 too where it cannot be told."""
+    @property
+    def change(self) -> int: ...
     @property
     def fits(self) -> list[LagFit]:
         """LagFit, by rising lag; none where the footage is no sequence."""

@@ -167,7 +167,8 @@ void leave_bad_images(std::vector<Candidate>& candidates) {
         // The same pixels twice beside a visible image that changed: the thermal stream hung. The
         // first may have been in time.
         if (&first != &c && likeness(c, first, 0) < kDuplicate)
-            c.reason = "source is frozen since frame " + std::to_string(first.index);
+            c.reason = "source is frozen since frame " + std::to_string(first.index) +
+                       " (a shutter calibration, or a stream that hung)";
     }
 }
 

@@ -78,11 +78,12 @@ Json json_of(const LagReport& lag) {
     for (const LagFit& fit : lag.fits)
         fits.push_back({{"lag", fit.lag},
                         {"frames", fit.frames},
+                        {"factor", fit.factor},
                         {"nec", fit.nec},
                         {"gain", fit.gain},
                         {"error", fit.error},
                         {"rig", json_of(fit.rig)}});
-    return {{"frames", lag.frames}, {"fits", fits}};
+    return {{"frames", lag.frames}, {"change", lag.change}, {"fits", fits}};
 }
 
 std::string text_of(const Json& document) {
