@@ -16,6 +16,8 @@ if TYPE_CHECKING:
         CalibrationReport,
         CalibrationResult,
         CandidateReport,
+        LagFit,
+        LagReport,
         LevelReport,
         Pinhole,
         Registrar,
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
         Rig,
         SearchOptions,
         calibrate,
+        fit_lags,
     )
     from xcalib.choose import choose_frames
 
@@ -54,6 +57,8 @@ __all__ = [
     "CalibrationReport",
     "CalibrationResult",
     "CandidateReport",
+    "LagFit",
+    "LagReport",
     "LevelReport",
     "Pinhole",
     "Registrar",
@@ -62,5 +67,6 @@ __all__ = [
     "SearchOptions",
     "calibrate",
     "choose_frames",
+    "fit_lags",
     "metrics",
 ]
