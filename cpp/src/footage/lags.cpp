@@ -21,7 +21,8 @@ constexpr int kCoarsest = 4, kMiddle = 2, kFinest = 1;  // levels
 constexpr int kIterations = 8;                          // of a refit at a level
 constexpr double kDeviations = 3.0;                     // of the mean difference that decide
 constexpr double kLeast = 0.002;                        // difference of the NEC that decides
-constexpr double kHopeless = 5.0;  // deviations at which a lag is looked at no more
+constexpr double kHopeless = 5.0;         // deviations at which a lag is looked at no more
+constexpr std::size_t kEvery = SIZE_MAX;  // lags that are refitted
 
 struct Difference {
     double mean = 0.0, error = INFINITY;
@@ -45,7 +46,7 @@ struct Lagged {
 
 // NEC of `a` above `b`, over the references that have both.
 Difference difference(const Lagged& a, const Lagged& b, std::size_t begin = 0,
-                      std::size_t end = SIZE_MAX) {
+                      std::size_t end = kEvery) {
     std::vector<double> values;
     for (std::size_t i = begin; i < std::min(a.nec.size(), end); ++i)
         if (std::isfinite(a.nec[i] - b.nec[i])) values.push_back(a.nec[i] - b.nec[i]);
@@ -246,7 +247,7 @@ LagReport fit_lags(const std::vector<ImageView>& references, const std::vector<I
         if (factor != kCoarsest) {
             // What half the size shows clearly needs no finer look.
             if (factor == kFinest && best_of(lags).gain.decides(kHopeless, kLeast)) break;
-            lags = hopeful(lags, factor == kFinest ? 2 : lags.size());
+            lags = hopeful(lags, factor == kFinest ? 2 : kEvery);
             if (lags.size() == 1) break;
             // Each from the rig of any: where nothing moves, one lag must not win by a better
             // start.
@@ -261,6 +262,7 @@ LagReport fit_lags(const std::vector<ImageView>& references, const std::vector<I
             report.change = change_of(lags);
         }
         for (const Lagged& lag : lags) fits[lag.lag] = fit_of(lag, rig.source_mirrored);
+        if (report.change != 0) break;
     }
     for (const auto& [lag, fit] : fits) report.fits.push_back(fit);
     if (report.change == 0 && best_of(lags).gain.decides(kDeviations, kLeast))
