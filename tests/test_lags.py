@@ -86,9 +86,9 @@ def test_a_late_source_is_named_by_both_commands(
         fits = {fit["lag"]: fit for fit in lag["fits"]}
         assert fits[0]["gain"] == 0 and fits[1]["gain"] > 3 * fits[1]["error"]
         # The way of a frame looks like a source that stands so much further ahead.
-        ahead = (fits[lag]["rig"]["translation_m"][2] for lag in (0, 1))
+        ahead = (fits[lag]["translation_m"][2] for lag in (0, 1))
         assert 0.1 < np.subtract(*ahead) < 1.0
-        assert {"rotation_deg", "source"} <= fits[0]["rig"].keys()
+        assert {"pan_deg", "tilt_deg", "skew_px"} <= fits[0].keys()
 
 
 def test_the_lag_is_taken_up_when_asked_for(late: Path, tmp_path: Path) -> None:

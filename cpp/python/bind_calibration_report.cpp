@@ -68,14 +68,19 @@ void bind_lag_report(py::module_& m) {
         .def_readonly("lag", &LagFit::lag,
                       "That a source is later than its own frame [source frames].")
         .def_readonly("frames", &LagFit::frames, "References that have such a source.")
-        .def_readonly("nec", &LagFit::nec, "Mean over them.")
+        .def_readonly("factor", &LagFit::factor,
+                      "Reduction of the level of the last fit: better lags are fitted further.")
+        .def_readonly("nec", &LagFit::nec, "Mean over the frames, there.")
         .def_readonly("gain", &LagFit::gain,
-                      "NEC of a reference above its own at lag 0, mean over those that have both.")
+                      "NEC of a frame above the same with its own source, there: mean.")
         .def_readonly("error", &LagFit::error, "Standard error of the gain.")
         .def_readonly("rig", &LagFit::rig, "Rig, refitted.");
     py::class_<LagReport>(m, "LagReport", "By how much the source is late beside its pairing.")
         .def_readonly("frames", &LagReport::frames,
-                      "[source frames]; 0 too where it cannot be told.")
+                      "[source frames]; 0 too where the fits do not show it.")
+        .def_readonly("change", &LagReport::change,
+                      "By how many frames the lag of the later half of the footage is the larger, "
+                      "where the halves differ.")
         .def_readonly("fits", &LagReport::fits,
                       "LagFit, by rising lag; none where the footage is no sequence.")
         .def("line", &LagReport::line, "How the fits compare.");

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
         CalibrationReport,
         CalibrationResult,
         CandidateReport,
+        LagFit,
+        LagReport,
         Lens,
         LensReport,
         LevelReport,
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
         Rig,
         SearchOptions,
         calibrate,
+        fit_lags,
     )
     from xcalib.choose import choose_frames
 
@@ -56,6 +59,8 @@ __all__ = [
     "CalibrationReport",
     "CalibrationResult",
     "CandidateReport",
+    "LagFit",
+    "LagReport",
     "Lens",
     "LensReport",
     "LevelReport",
@@ -66,5 +71,6 @@ __all__ = [
     "SearchOptions",
     "calibrate",
     "choose_frames",
+    "fit_lags",
     "metrics",
 ]

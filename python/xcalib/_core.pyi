@@ -372,11 +372,14 @@ class LagFit:
     def frames(self) -> int:
         """References that have such a source."""
     @property
+    def factor(self) -> int:
+        """Reduction of the level of the last fit: better lags are fitted further."""
+    @property
     def nec(self) -> float:
-        """Mean over them."""
+        """Mean over the frames, there."""
     @property
     def gain(self) -> float:
-        """NEC of a reference above its own at lag 0, mean over those that have both."""
+        """NEC of a frame above the same with its own source, there: mean."""
     @property
     def error(self) -> float:
         """Standard error of the gain."""
@@ -388,7 +391,12 @@ class LagReport:
     """By how much the source is late beside its pairing."""
     @property
     def frames(self) -> int:
-        """[source frames]; 0 too where it cannot be told."""
+        """[source frames]; 0 too where the fits do not show it."""
+    @property
+    def change(self) -> int:
+        """By how many frames the lag of the later half of the footage is the larger, where the
+        halves differ.
+        """
     @property
     def fits(self) -> list[LagFit]:
         """LagFit, by rising lag; none where the footage is no sequence."""

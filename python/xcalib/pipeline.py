@@ -126,6 +126,8 @@ class Frames:
             sources, line = scalar_sources(self.sources, colormap)
             return replace(self, sources=sources), line
         every, line = scalar_sources(self.all_sources, colormap)
+        if every is self.all_sources:
+            return self, line
         return replace(self, sources=Picked(every, self.partners), all_sources=every), line
 
     def with_lag(self, lag: int, chosen: Sequence[int]) -> tuple[Frames, list[int]]:

@@ -10,7 +10,7 @@ namespace {
 using testing::has;
 using testing::refusal;
 
-constexpr int kFrames = 14, kWidth = 160, kHeight = 120;
+constexpr int kFrames = 18, kWidth = 160, kHeight = 120;
 
 // A rig before a scene that moves by `steps` from frame to frame, sources a little noisy.
 struct Drive {
@@ -40,8 +40,9 @@ struct Drive {
         if (mirrored) truth = with_flipped_source(truth);
     }
 
-    // With the source `late` frames late in what is called its own.
-    LagReport report(int late) const {
+    // With the source `late` frames late in what is called its own; from the middle on `later`.
+    LagReport report(int late) const { return report(late, late); }
+    LagReport report(int before, int later) const {
         std::vector<ImageView> reference_views, depth_views;
         std::vector<SourcesAtLag> lags;
         for (int lag = -kMaxLag; lag <= kMaxLag; ++lag) lags.push_back({lag, {}});
@@ -50,7 +51,7 @@ struct Drive {
             reference_views.push_back(references[at].view());
             depth_views.push_back(depths[at].view());
             for (SourcesAtLag& lag : lags) {
-                const int source = i + lag.lag - late;
+                const int source = i + lag.lag - (2 * i < kFrames ? before : later);
                 lag.sources.push_back(source < 0 || source >= kFrames
                                           ? ImageView{}
                                           : sources[static_cast<std::size_t>(source)].view());
@@ -85,6 +86,17 @@ TEST(Lags, AreNotFoundWhereNothingMoves) {
     const LagReport found = Drive(4, [](int) { return Eigen::Vector2d(0, 0); }).report(1);
     EXPECT_EQ(found.frames, 0) << found.line();
     EXPECT_TRUE(has(found.line(), "no lag fits better"));
+}
+
+TEST(Lags, ThatChangeAreSaidToChange) {
+    const Drive drive(6, wandering);
+    for (const int change : {-1, 1}) {
+        const LagReport found = drive.report(0, change);
+        EXPECT_EQ(found.change, change) << found.line();
+        EXPECT_EQ(found.frames, 0);
+        EXPECT_TRUE(has(found.line(), "between the halves of the footage"));
+    }
+    EXPECT_EQ(drive.report(1).change, 0);
 }
 
 TEST(Lags, OfMirroredSourcesAreFoundToo) {

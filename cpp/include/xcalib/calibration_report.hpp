@@ -51,17 +51,21 @@ struct AdamStep {
 
 // The fit with the sources some frames later, refitted.
 struct LagFit {
-    int lag = 0;        // that a source is later than its own frame [source frames]
-    int frames = 0;     // of the references looked at, those that have such a source
-    double nec = 0.0;   // mean over them
-    double gain = 0.0;  // NEC of a reference above its own at lag 0, mean over those that have both
+    int lag = 0;         // that a source is later than its own frame [source frames]
+    int frames = 0;      // of the references looked at, those that have such a source
+    int factor = 1;      // of the level of the last fit: better lags are fitted further
+    double nec = 0.0;    // mean over the frames, there
+    double gain = 0.0;   // NEC of a frame above the same with its own source, there: mean
     double error = 0.0;  // of the gain: its standard error
     Rig rig;             // refitted
 };
 
 // By how much the source is late beside what it was paired with.
 struct LagReport {
-    int frames = 0;            // [source frames]; 0 too where it cannot be told
+    int frames = 0;  // [source frames]; 0 too where the fits do not show it
+    // By how many frames the lag of the later half of the footage is the larger, where the halves
+    // differ: the source lost frames, or a pause of it was not counted.
+    int change = 0;
     std::vector<LagFit> fits;  // by rising lag; none where the footage is no sequence
 
     const LagFit& at(int lag) const;  // which must be among them

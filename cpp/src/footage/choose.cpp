@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <initializer_list>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
@@ -155,7 +156,8 @@ void leave_bad_images(std::vector<Candidate>& candidates) {
         // The same pixels twice beside a visible image that changed: the thermal stream hung. The
         // first may have been in time.
         if (&first != &c && likeness(c, first, 0) < kDuplicate)
-            c.reason = "source is frozen since frame " + std::to_string(first.index);
+            c.reason = "source is frozen since frame " + std::to_string(first.index) +
+                       " (a shutter calibration, or a stream that hung)";
     }
 }
 
@@ -268,9 +270,10 @@ Alignment align(const std::vector<const Candidate*>& candidates, const Turn& tur
     const cv::Size grid = references[0].size();
     Alignment best;
     best.turn = turn;
+    const double equal_width = static_cast<double>(grid.width) / fields[0].cols;
     for (int k = 0; k < scales; ++k) {
-        const double scale =
-            kSmallestScale * std::pow(kLargestScale / kSmallestScale, k / (scales - 1.0));
+        const double scale = equal_width * kSmallestScale *
+                             std::pow(kLargestScale / kSmallestScale, k / (scales - 1.0));
         std::vector<cv::Mat> sources;
         for (const cv::Mat& field : fields) sources.push_back(scaled(field, scale));
         const cv::Mat score = pooled_score(references, sources);
@@ -292,13 +295,20 @@ Alignment align(const std::vector<const Candidate*>& candidates, const Turn& tur
 std::pair<Alignment, bool> align(const std::vector<Candidate*>& candidates) {
     const std::vector<const Candidate*> few = some_of(candidates, kFew);
     std::vector<Alignment> turns;
-    for (const bool mirrored : {false, true})
-        for (int quarters = 0; quarters < 4; ++quarters)
-            turns.push_back(align(few, {quarters, mirrored}, kFewScales));
-    std::sort(turns.begin(), turns.end(),
-              [](const Alignment& a, const Alignment& b) { return a.score > b.score; });
-    const bool clear = turns[0].score > kClear * turns[1].score;
-    return {align(some_of(candidates, kPooled), clear ? turns[0].turn : Turn{}, kScales), clear};
+    const auto clear = [&] {
+        std::sort(turns.begin(), turns.end(),
+                  [](const Alignment& a, const Alignment& b) { return a.score > b.score; });
+        return turns[0].score > kClear * turns[1].score;
+    };
+    const auto look = [&](std::initializer_list<Turn> at) {
+        for (const Turn& turn : at) turns.push_back(align(few, turn, kFewScales));
+    };
+    // Upright is the rule, and two others show what chance gives.
+    look({{0, false}, {2, false}, {1, true}});
+    if (!clear() || turns[0].turn.quarters || turns[0].turn.mirrored)
+        look({{0, true}, {1, false}, {2, true}, {3, false}, {3, true}});
+    const bool found = clear();
+    return {align(some_of(candidates, kPooled), found ? turns[0].turn : Turn{}, kScales), found};
 }
 
 // Source edge fields on the reference grid.

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <map>
+#include <memory>
 #include <stdexcept>
 
 #include "base/format.hpp"
@@ -18,16 +21,8 @@ constexpr int kCoarsest = 4, kMiddle = 2, kFinest = 1;  // levels
 constexpr int kIterations = 8;                          // of a refit at a level
 constexpr double kDeviations = 3.0;                     // of the mean difference that decide
 constexpr double kLeast = 0.002;                        // difference of the NEC that decides
-constexpr double kHopeless = 5.0;  // deviations at which a lag is looked at no more
-
-// What is fitted at one lag.
-struct Lagged {
-    int lag = 0;
-    std::vector<std::size_t> frames;  // of the references
-    WorkingImages images;
-    Rig rig;
-    std::vector<double> nec;  // of each reference; NaN where there is no source
-};
+constexpr double kHopeless = 5.0;         // deviations at which a lag is looked at no more
+constexpr std::size_t kEvery = SIZE_MAX;  // lags that are refitted
 
 struct Difference {
     double mean = 0.0, error = INFINITY;
@@ -38,10 +33,22 @@ struct Difference {
     }
 };
 
+// What is fitted at one lag.
+struct Lagged {
+    int lag = 0;
+    std::vector<std::size_t> frames;  // of the references
+    std::shared_ptr<const WorkingImages> images;
+    Rig rig;
+    std::vector<double> nec;  // of each reference; NaN where there is no source
+    int factor = 0;           // of the level that these belong to
+    Difference gain;          // over lag 0 at that level
+};
+
 // NEC of `a` above `b`, over the references that have both.
-Difference difference(const Lagged& a, const Lagged& b) {
+Difference difference(const Lagged& a, const Lagged& b, std::size_t begin = 0,
+                      std::size_t end = kEvery) {
     std::vector<double> values;
-    for (std::size_t i = 0; i < a.nec.size(); ++i)
+    for (std::size_t i = begin; i < std::min(a.nec.size(), end); ++i)
         if (std::isfinite(a.nec[i] - b.nec[i])) values.push_back(a.nec[i] - b.nec[i]);
     Difference out;
     out.frames = static_cast<int>(values.size());
@@ -57,7 +64,7 @@ Difference difference(const Lagged& a, const Lagged& b) {
 // Refits at a level, from the better of the rigs `starts`, and takes the NEC of every frame.
 void refit(int factor, const std::vector<Rig>& starts, const Plan& plan, Lagged& at) {
     const int num_threads = plan.options.num_threads;
-    const Level level = make_level(at.images, factor, starts[0], num_threads);
+    const Level level = make_level(*at.images, factor, starts[0], num_threads);
     at.rig = starts[0];
     NecValue best = pooled(level, at.rig, num_threads);
     for (std::size_t k = 1; k < starts.size(); ++k) {
@@ -71,21 +78,9 @@ void refit(int factor, const std::vector<Rig>& starts, const Plan& plan, Lagged&
     std::vector<double> values(level.pairs.size());
     parallel_each(static_cast<int>(values.size()), num_threads,
                   [&](int i) { values[i] = level.pairs[i]->evaluate(at_level).nec; });
+    at.factor = factor;
     at.nec.assign(at.nec.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t i = 0; i < values.size(); ++i) at.nec[at.frames[i]] = values[i];
-}
-
-// The lag of the highest mean NEC.
-std::size_t best_of(const std::vector<Lagged>& lags, std::size_t own) {
-    std::size_t best = own;
-    double most = 0;
-    for (std::size_t k = 0; k < lags.size(); ++k) {
-        const double gain = k == own ? 0.0 : difference(lags[k], lags[own]).mean;
-        if (gain <= most) continue;
-        most = gain;
-        best = k;
-    }
-    return best;
 }
 
 std::size_t own_of(const std::vector<Lagged>& lags) {
@@ -94,17 +89,58 @@ std::size_t own_of(const std::vector<Lagged>& lags) {
     return own;
 }
 
+// Beside lag 0, all at one level.
+void compare(std::vector<Lagged>& lags) {
+    const Lagged own = lags[own_of(lags)];
+    for (Lagged& lag : lags)
+        if (lag.lag != 0) lag.gain = difference(lag, own);
+}
+
+// The lag of the highest mean NEC, by the gains over lag 0.
+const Lagged& best_of(const std::vector<Lagged>& lags) {
+    return *std::max_element(lags.begin(), lags.end(), [](const Lagged& a, const Lagged& b) {
+        return a.gain.mean < b.gain.mean;
+    });
+}
+
+// The lag at which the later half of the footage fits better, and the first half worse, or the
+// other way round; 0 where there is none.
+int change_of(const std::vector<Lagged>& lags) {
+    const Lagged& own = lags[own_of(lags)];
+    const std::size_t half = own.nec.size() / 2;
+    for (const Lagged& lag : lags) {
+        if (difference(own, lag, 0, half).decides(kDeviations, kLeast) &&
+            difference(lag, own, half).decides(kDeviations, kLeast))
+            return lag.lag;
+        if (difference(lag, own, 0, half).decides(kDeviations, kLeast) &&
+            difference(own, lag, half).decides(kDeviations, kLeast))
+            return -lag.lag;
+    }
+    return 0;
+}
+
 // Without the lags that have fallen behind the best, and at most `count` of them; lag 0 stays.
-std::vector<Lagged> hopeful(std::vector<Lagged> lags, std::size_t count) {
-    const std::size_t own = own_of(lags), best = best_of(lags, own);
-    std::vector<bool> keep;
-    for (std::size_t k = 0; k < lags.size(); ++k)
-        keep.push_back(k == own || k == best ||
-                       (count > 2 && !difference(lags[best], lags[k]).decides(kHopeless, kLeast)));
+std::vector<Lagged> hopeful(const std::vector<Lagged>& lags, std::size_t count) {
+    const Lagged& best = best_of(lags);
     std::vector<Lagged> kept;
-    for (std::size_t k = 0; k < lags.size(); ++k)
-        if (keep[k]) kept.push_back(std::move(lags[k]));
+    for (const Lagged& lag : lags)
+        if (lag.lag == 0 || lag.lag == best.lag ||
+            (count > 2 && !difference(best, lag).decides(kHopeless, kLeast)))
+            kept.push_back(lag);
     return kept;
+}
+
+// What is reported of it, in the images as they were given.
+LagFit fit_of(const Lagged& lag, bool mirrored) {
+    LagFit fit;
+    fit.lag = lag.lag;
+    fit.frames = static_cast<int>(lag.frames.size());
+    fit.factor = lag.factor;
+    for (const std::size_t i : lag.frames) fit.nec += lag.nec[i] / fit.frames;
+    fit.gain = lag.gain.mean;
+    fit.error = lag.lag == 0 ? 0.0 : lag.gain.error;
+    fit.rig = mirrored ? with_flipped_source(lag.rig) : lag.rig;
+    return fit;
 }
 
 int count_of(const SourcesAtLag& at) {
@@ -175,9 +211,10 @@ LagReport fit_lags(const std::vector<ImageView>& references, const std::vector<I
             lagged.frames.push_back(i);
             views.push_back(at.sources[i]);
         }
-        lagged.images = images.subset(lagged.frames);
-        if (at.lag != 0) lagged.images = with_sources(lagged.images, views, options.num_threads);
-        if (rig.source_mirrored) lagged.images = with_mirrored_sources(lagged.images);
+        WorkingImages own = images.subset(lagged.frames);
+        if (at.lag != 0) own = with_sources(std::move(own), views, options.num_threads);
+        if (rig.source_mirrored) own = with_mirrored_sources(own);
+        lagged.images = std::make_shared<const WorkingImages>(std::move(own));
         return lagged;
     };
 
@@ -202,38 +239,34 @@ LagReport fit_lags(const std::vector<ImageView>& references, const std::vector<I
     std::sort(lags.begin(), lags.end(),
               [](const Lagged& a, const Lagged& b) { return a.lag < b.lag; });
 
-    std::vector<Lagged> judged = lags;
-    for (const int factor : {kMiddle, kFinest}) {
-        judged = hopeful(std::move(judged), factor == kFinest ? 2 : judged.size());
-        if (judged.size() == 1) break;
-        // Each from the rig of any: where nothing moves, one lag must not win by a better start.
-        std::vector<Rig> rigs;
-        for (const Lagged& lag : judged) rigs.push_back(lag.rig);
-        for (Lagged& lag : judged) {
-            std::vector<Rig> starts = {lag.rig};
-            starts.insert(starts.end(), rigs.begin(), rigs.end());
-            refit(factor, starts, plan, lag);
-            *std::find_if(lags.begin(), lags.end(),
-                          [&](const Lagged& l) { return l.lag == lag.lag; }) = lag;
-        }
-    }
-    const std::size_t own = own_of(lags);
+    compare(lags);
 
     LagReport report;
-    for (const Lagged& lag : lags) {
-        LagFit fit;
-        fit.lag = lag.lag;
-        fit.frames = static_cast<int>(lag.frames.size());
-        for (const std::size_t i : lag.frames) fit.nec += lag.nec[i] / fit.frames;
-        const Difference beside = difference(lag, lags[own]);
-        fit.gain = beside.mean;
-        fit.error = lag.lag == 0 ? 0.0 : beside.error;
-        fit.rig = rig.source_mirrored ? with_flipped_source(lag.rig) : lag.rig;
-        report.fits.push_back(fit);
+    std::map<int, LagFit> fits;
+    for (const int factor : {kCoarsest, kMiddle, kFinest}) {
+        if (factor != kCoarsest) {
+            // What half the size shows clearly needs no finer look.
+            if (factor == kFinest && best_of(lags).gain.decides(kHopeless, kLeast)) break;
+            lags = hopeful(lags, factor == kFinest ? 2 : kEvery);
+            if (lags.size() == 1) break;
+            // Each from the rig of any: where nothing moves, one lag must not win by a better
+            // start.
+            std::vector<Rig> rigs;
+            for (const Lagged& lag : lags) rigs.push_back(lag.rig);
+            for (Lagged& lag : lags) {
+                std::vector<Rig> starts = {lag.rig};
+                starts.insert(starts.end(), rigs.begin(), rigs.end());
+                refit(factor, starts, plan, lag);
+            }
+            compare(lags);
+            report.change = change_of(lags);
+        }
+        for (const Lagged& lag : lags) fits[lag.lag] = fit_of(lag, rig.source_mirrored);
+        if (report.change != 0) break;
     }
-    const std::size_t best = best_of(judged, own_of(judged));
-    if (difference(judged[best], judged[own_of(judged)]).decides(kDeviations, kLeast))
-        report.frames = judged[best].lag;
+    for (const auto& [lag, fit] : fits) report.fits.push_back(fit);
+    if (report.change == 0 && best_of(lags).gain.decides(kDeviations, kLeast))
+        report.frames = best_of(lags).lag;
     return report;
 }
 

@@ -86,14 +86,20 @@ Json numbers_of(const Vector& values) {
 Json json_of(const LagReport& lag) {
     if (lag.fits.empty()) return nullptr;
     Json fits = Json::array();
-    for (const LagFit& fit : lag.fits)
+    for (const LagFit& fit : lag.fits) {
+        const RigFacts facts = describe(fit.rig);
         fits.push_back({{"lag", fit.lag},
                         {"frames", fit.frames},
+                        {"factor", fit.factor},
                         {"nec", fit.nec},
                         {"gain", fit.gain},
                         {"error", fit.error},
-                        {"rig", json_of(fit.rig)}});
-    return {{"frames", lag.frames}, {"fits", fits}};
+                        {"translation_m", numbers_of(fit.rig.t())},
+                        {"pan_deg", facts.pan_deg},
+                        {"tilt_deg", facts.tilt_deg},
+                        {"skew_px", fit.rig.source.skew}});
+    }
+    return {{"frames", lag.frames}, {"change", lag.change}, {"fits", fits}};
 }
 
 std::string text_of(const Json& document) {

@@ -24,6 +24,9 @@ const LagFit& LagReport::at(int lag) const {
 
 std::string LagReport::line() const {
     if (fits.empty()) return "the footage is no sequence, lags were not looked at";
+    if (change != 0)
+        return format("the source's lag changes by %+d %s between the halves of the footage",
+                      change, std::abs(change) == 1 ? "frame" : "frames");
     const auto best = std::max_element(fits.begin(), fits.end(), [](const auto& a, const auto& b) {
         return (a.lag ? a.gain : -INFINITY) < (b.lag ? b.gain : -INFINITY);
     });
@@ -58,12 +61,12 @@ std::string CalibrationReport::full() const {
                        c.refined.reference.hfov() * kDegrees, c.refined.source.hfov() * kDegrees);
     }
     if (!lag.fits.empty()) {
-        text +=
-            "lags: " + lag.line() + "\nlag [frames]  frames     NEC  gain                 t [m]\n";
+        text += "lags: " + lag.line() +
+                "\nlag [frames]  frames  level     NEC  gain                 t [m]\n";
         for (const LagFit& fit : lag.fits)
-            text += format("%+12d  %6d  %.4f  %+.4f +- %.4f  %+8.4f %+8.4f %+8.4f\n", fit.lag,
-                           fit.frames, fit.nec, fit.gain, fit.error, fit.rig.t().x(),
-                           fit.rig.t().y(), fit.rig.t().z());
+            text += format("%+12d  %6d  1/%-3d  %.4f  %+.4f +- %.4f  %+8.4f %+8.4f %+8.4f\n",
+                           fit.lag, fit.frames, fit.factor, fit.nec, fit.gain, fit.error,
+                           fit.rig.t().x(), fit.rig.t().y(), fit.rig.t().z());
     }
     text +=
         "level  stage  size       iterations  cost                  NEC     valid  condition   s  "

@@ -70,9 +70,14 @@ void add_lags(const LagReport& lag, const TimeOffset& offset, const Stream& all_
               CalibrationResult& result) {
     CalibrationReport& report = result.report;
     report.lag = lag;
-    if (lag.frames == 0) return;
-    const FrameClock clock = clock_of(all_sources.frames()).value();
-    const std::string late = lag.line() + ": try " + option_for_lag(offset, lag.frames, clock);
+    if (lag.frames == 0 && lag.change == 0) return;
+    std::string late = lag.line() + ": ";
+    if (lag.change != 0)
+        late +=
+            "it lost frames, or a pause was not counted; give times of both (--source-times), or a "
+            "part of the footage";
+    else
+        late += "try " + option_for_lag(offset, lag.frames, clock_of(all_sources.frames()).value());
     report.message = report.converged ? late : report.message + "; " + late;
     report.converged = result.converged = false;
 }
