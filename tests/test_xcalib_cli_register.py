@@ -259,7 +259,7 @@ def test_16_bits_in_a_video(cli: Callable[..., Process], scene: Path, tmp_path: 
     images = open_stream(tmp_path / "out.mkv")
     assert images[0].dtype == np.uint16 and images[0].max() > 255
     same_frames(tmp_path / "out.mkv", tmp_path / "out")
-    refused = cli(*given, tmp_path / "out.mp4")
+    refused = cli(*given, tmp_path / "other.mp4")
     assert refused.returncode == 2 and ".mp4 holds uint8, a folder holds any" in refused.stderr
 
 

@@ -331,6 +331,7 @@ TEST_F(RigFile, ANumberThatNoDoubleHoldsIsRefused) {
                         "reference.fx = " + std::string(value) + ", expected a finite number"));
     EXPECT_TRUE(has(refusal_with("[0.1, -0.2, 0.3]", "[0.1, 1e400, 0.3]"), "= 1e400, expected"));
     EXPECT_TRUE(has(refusal_with("width: 640", "width: 99999999999"), "width = 99999999999"));
+    EXPECT_LT(refusal_with("xcalib-rig", std::string(5000, 'x')).size(), path_.size() + 150);
     // Of a number of many digits a few are quoted.
     const std::string message = refusal_with("fx: 600", "fx: x" + std::string(300, '1'));
     EXPECT_LT(message.size(), path_.size() + 150) << message;

@@ -1,5 +1,12 @@
+#include <opencv2/core/utils/logger.hpp>
+
 #include "footage.hpp"
 #include "fuzzed.hpp"
+
+extern "C" int LLVMFuzzerInitialize(int*, char***) {
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    return 0;
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const auto file = xcalib::fuzz::file_of(xcalib::fuzz::text_of(data, size), "stack.tiff");

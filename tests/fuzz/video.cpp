@@ -1,10 +1,12 @@
 #include <cstdlib>
+#include <opencv2/core/utils/logger.hpp>
 
 #include "footage.hpp"
 #include "fuzzed.hpp"
 
 extern "C" int LLVMFuzzerInitialize(int*, char***) {
     setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
     return 0;
 }
 

@@ -53,7 +53,8 @@ struct Destination {
     std::filesystem::path file;  // that links lead to
     bool direct = false;         // a pipe or a device: written to as it is, never replaced
 
-    // Throws InputError for what cannot be written as a file: a socket, a disk, a link that leads nowhere, an empty name or one that ends in a slash.
+    // Throws InputError for what cannot be written as a file: a socket, a disk, a link that leads
+    // nowhere, an empty name or one that ends in a slash.
     explicit Destination(const std::filesystem::path& named);
 };
 

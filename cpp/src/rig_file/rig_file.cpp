@@ -88,12 +88,12 @@ class Section {
 
     [[noreturn]] void fail(const char* key, const std::string& value,
                            const std::string& expected) const {
-        reject(path_, name_ + "." + key + " = " + value + ", expected " + expected);
+        reject(path_, name_ + "." + key + " = " + quoted(value) + ", expected " + expected);
     }
 
    private:
     static std::string scalar(const YAML::Node& node) {
-        return node.IsScalar() ? quoted(node.Scalar()) : "(not a single value)";
+        return node.IsScalar() ? node.Scalar() : "(not a single value)";
     }
     static std::string joined(const std::initializer_list<const char*>& names) {
         std::string text;

@@ -153,6 +153,19 @@ void Journal::append(std::vector<std::pair<std::string, long>> frames,
     append({std::move(unit)});
 }
 
+void Journal::claim() {
+    const std::lock_guard lock(mutex_);
+    if (lseek(descriptor_, 0, SEEK_END) != 0) return;
+    write(first_ + "\n");
+    sync();
+    sync_to_disk(path_.has_parent_path() ? path_.parent_path() : ".");
+}
+
+void Journal::sync() const {
+    if (fdatasync(descriptor_) != 0 && errno != EINVAL)
+        throw std::system_error(errno, std::generic_category(), path_.string());
+}
+
 void Journal::append(std::vector<Unit> units) {
     std::string lines;
     for (const Unit& unit : units) {
@@ -162,14 +175,10 @@ void Journal::append(std::vector<Unit> units) {
         for (const auto& [name, size] : unit.files) line["files"][name] = size;
         lines += dumped(line) + "\n";
     }
+    claim();
     const std::lock_guard lock(mutex_);
-    if (lseek(descriptor_, 0, SEEK_END) == 0) {
-        write(first_ + "\n");
-        sync_to_disk(path_.has_parent_path() ? path_.parent_path() : ".");
-    }
     write(lines);
-    if (fdatasync(descriptor_) != 0 && errno != EINVAL)
-        throw std::system_error(errno, std::generic_category(), path_.string());
+    sync();
     std::move(units.begin(), units.end(), std::back_inserter(units_));
 }
 

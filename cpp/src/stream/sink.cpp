@@ -97,20 +97,18 @@ class FolderSink : public Sink {
         keep();
     }
 
-    // Those written since are on the disk now, are noted, and have their names: in this order.
+    // Those written since are on the disk now, have their names, and are noted: in this order.
     void keep() override {
         std::unique_lock lock(mutex_);
         std::vector<WholeFile> files = std::exchange(files_, {});
         std::vector<Unit> units = std::exchange(units_, {});
         kept_ = Clock::now();
         lock.unlock();
+        if (units.empty()) return;
         keep_all(files, [&] {
-            if (!journal_ || units.empty()) return;
-            // A frame made anew: its old files, of that size by chance, would count as the new.
-            for (const Unit& unit : units)
-                for (const auto& [name, size] : unit.files) ::unlink((folder_ / name).c_str());
-            journal_->append(std::move(units));
+            if (journal_) journal_->claim();
         });
+        if (journal_) journal_->append(std::move(units));
     }
 
     void finish(const std::vector<FrameName>&, const std::function<void()>&) override { keep(); }

@@ -3,8 +3,8 @@
 //
 // A text file beside the output: a line of JSON on how the output is made, then a line for each
 // unit of whole files: which frames they hold, and their sizes. A line is written after its files
-// are on the disk, and counts where files of that size have the names in it: whatever moment a run
-// ends at, the journal never promises what is not there.
+// are on the disk, and counts while they have that size: whatever moment a run ends at, the journal
+// never promises what is not there.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ struct Unit {
 // words, so that one does not go on with what another began.
 using MadeWith = std::vector<std::pair<std::string, std::string>>;
 
-// The journal of one output, held by one process at a time. Until there is a first unit the file is
-// empty, and goes when it is closed.
+// The journal of one output, held by one process at a time. Until a first file is written the file
+// is empty, and goes when it is closed.
 class Journal {
    public:
     // The folder is made where there is none. `overwrite`: remove what is there instead of going on
@@ -56,8 +56,11 @@ class Journal {
     // the disk then.
     void append(std::vector<std::pair<std::string, long>> frames,
                 const std::vector<std::string>& files);
-    // Of units whose files are there, or are about to get their names.
     void append(std::vector<Unit> units);
+
+    // Before the first file has its name: from here on what is called as this output's files is of
+    // runs that this journal is of, noted or not.
+    void claim();
 
    private:
     void open();
@@ -65,6 +68,7 @@ class Journal {
     // `made_with`: null for any.
     void load(const MadeWith* made_with, bool overwrite);
     void write(const std::string& data);
+    void sync() const;
 
     std::filesystem::path path_;
     std::string first_;
