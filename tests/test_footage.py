@@ -14,6 +14,7 @@ import pytest
 
 from conftest import FRAMES, run
 from xcalib import Lens, Pinhole, Rig, metrics
+from xcalib._core import parse_time_offset
 from xcalib.depth import FolderDepth, PlaneDepth, read_depth
 from xcalib.footage import (
     OffsetEstimate,
@@ -894,6 +895,12 @@ def test_frames_that_cannot_be_decoded_do_not_hinder_the_offset() -> None:
     assert estimate_offset(visible, thermal).offset == pytest.approx(0.2, abs=0.008)
     candidates = offsets_around(0.2, visible, thermal)
     assert refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates, 40).decided
+
+
+@pytest.mark.parametrize("text", ["auto", "0.25", "-2f", "0.0"])
+def test_an_offset_reads_as_it_is_written(text: str) -> None:
+    """The journal of `register` has it so."""
+    assert str(parse_time_offset(text)) == text
 
 
 def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> None:
