@@ -449,6 +449,35 @@ def test_live_frames_do_not_mix_with_others(
     assert {path.name for path in tmp_path.iterdir()} == {"out", "live.mkv", "live.masks.mkv"}
 
 
+def test_a_killed_live_video_is_made_of_its_parts(
+    binary: Path, cli: Callable[..., Process], film: tuple[Path, ...], tmp_path: Path
+) -> None:
+    out = tmp_path / "out.mkv"
+    given = ("register", *film, "--depth", "plane", "--live", "-o", out)
+    some = lambda: bool(whole_lines(journal_of(out)))  # noqa: E731
+    code, _ = interrupted((binary, *given), some, signal.SIGKILL, 0)
+    assert code == -signal.SIGKILL and not out.exists()
+    noted = [len(json.loads(line)["frames"]) for line in whole_lines(journal_of(out))]
+    assert noted and set(noted) == {250}
+    again = cli(*given)
+    assert again.returncode == 2 and "`xcalib-cli join` makes a video of what" in again.stderr
+    joined = cli("join", out)
+    assert joined.returncode == 0, joined.stderr
+    assert joined.stdout == f"{sum(noted)} frames: {out}\n"
+    assert cli("register", *film, "--depth", "plane", "-o", tmp_path / "whole.mkv").returncode == 0
+    for name in ("out.mkv", "out.masks.mkv"):
+        made = open_stream(tmp_path / name)
+        whole = open_stream(tmp_path / name.replace("out", "whole"))
+        assert len(made) == sum(noted)
+        for index in (0, 249):
+            gray = cv2.extractChannel(made[index], 0)  # a live file is read as colour
+            np.testing.assert_array_equal(gray, whole[index])
+    assert not (tmp_path / "out.mkv.parts").exists()
+    assert "is joined already" in cli("join", out).stderr
+    refused = cli("join", tmp_path / "whole.mkv")
+    assert refused.returncode == 2 and "expected those of a live run" in refused.stderr
+
+
 # -- The offset of two clocks
 
 
