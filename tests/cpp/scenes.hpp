@@ -202,7 +202,8 @@ inline Rig moved(const Rig& rig, int parameter, double step) {
                                   &camera.center[1], &camera.skew_share[0]};
         *fields[which] += step;
     };
-    if (parameter >= kReferenceLogFx) in_camera(p.reference, parameter - kReferenceLogFx);
+    if (parameter >= kSourceK1) p.source_lens[parameter - kSourceK1] += step;
+    else if (parameter >= kReferenceLogFx) in_camera(p.reference, parameter - kReferenceLogFx);
     else if (parameter >= kTranslationX) p.translation[parameter - kTranslationX] += step;
     else in_camera(p.source, parameter - kSourceLogFx);
     return rig_from_solver(p, rig);
@@ -234,6 +235,7 @@ inline constexpr ParameterClass kParameterClasses[] = {
     {"reference focal lengths", kReferenceLogFx, 2},
     {"reference principal point", kReferenceCx, 2},
     {"reference skew", kReferenceSkew, 1},
+    {"source lens", kSourceK1, 2},
 };
 
 }  // namespace xcalib::testing

@@ -42,8 +42,7 @@ TEST(Adam, JacobianAgreesWithCentralDifferences) {
         down[v] -= kStep;
         const SolverParameters a = solver_from_rig(rig_at(down)), b = solver_from_rig(rig_at(up));
         Eigen::Matrix<double, kNumParameters, 1> change;
-        for (int i = 0; i < 2; ++i)
-            change[kSourceK1 + i] = b.source_lens[i] - a.source_lens[i];
+        for (int i = 0; i < 2; ++i) change[kSourceK1 + i] = b.source_lens[i] - a.source_lens[i];
         const auto camera = [&](int row, const SolverParameters::Camera& from,
                                 const SolverParameters::Camera& to) {
             change.segment<5>(row) << to.log_f[0] - from.log_f[0], to.log_f[1] - from.log_f[1],

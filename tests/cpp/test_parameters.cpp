@@ -119,5 +119,19 @@ TEST(SolverParameters, AQuaternionOffTheSphereIsNormalized) {
     EXPECT_LT((rig.R() * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-14);
 }
 
+TEST(SolverParameters, HaveK1AndK2OfALensThatIsAPolynomial) {
+    Rig rig{kCamera, kCamera, {}};
+    SolverParameters p = solver_from_rig(rig);
+    EXPECT_FALSE(rig_from_solver(p, rig).source.lens.bends()) << "what is none stays none";
+    p.source_lens[0] = -0.25;
+    p.source_lens[1] = 0.0625;
+    EXPECT_EQ(rig_from_solver(p, rig).source.lens, Lens(LensModel::brown, {-0.25, 0.0625, 0, 0}));
+    rig.source.lens = Lens(LensModel::brown, {0.1, 0.2, 0.01, 0.02, 0.3});
+    EXPECT_EQ(rig_from_solver(p, rig).source.lens,
+              Lens(LensModel::brown, {-0.25, 0.0625, 0.01, 0.02, 0.3}));
+    rig.source.lens = Lens(LensModel::fisheye, {0.1, 0.2, 0, 0});
+    EXPECT_EQ(rig_from_solver(p, rig).source.lens, rig.source.lens) << "which has other ones";
+}
+
 }  // namespace
 }  // namespace xcalib

@@ -23,6 +23,10 @@ void expect_jacobian_of_central_differences(const Rig& rig, std::mt19937& random
     for (const ParameterClass& group : kParameterClasses) {
         const auto expected = numeric.middleCols(group.first, group.count);
         const auto found = jacobian.middleCols(group.first, group.count);
+        if (group.first == kSourceK1 && !has_lens_parameters(rig.source.lens)) {
+            EXPECT_EQ(found.norm(), 0) << "k1 and k2 of another lens are no parameters";
+            continue;
+        }
         EXPECT_GT(expected.norm(), 0) << group.name;
         EXPECT_LT((found - expected).norm(), 1e-4 * expected.norm()) << group.name;
     }

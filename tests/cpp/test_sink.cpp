@@ -293,7 +293,7 @@ TEST(Outputs, ShareNoMasks) {
     write_text(scratch / "o.mp4.register.jsonl", "of o.mp4");
     write_text(scratch / "q.avi.register.jsonl", "");  // which has made nothing yet
     EXPECT_EQ(refused("o.avi"), (scratch / "o.avi").string() + " would share o.masks.mkv with " +
-                                 (scratch / "o.mp4").string() + ", expected another name");
+                                    (scratch / "o.mp4").string() + ", expected another name");
     for (const char* name : {"o.mp4", "p.avi", "q.mkv", "o"}) EXPECT_EQ(refused(name), "") << name;
 }
 
