@@ -1276,6 +1276,8 @@ def frames_later(
 ) -> tuple[list[int], list[int]]:
     """Of pairs with these partners in all_sources: those that have one lag frames later, and
     these partners.
+    """
+
 def max_threads() -> int:
     """How many threads may be asked for."""
 
