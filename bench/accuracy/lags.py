@@ -3,7 +3,7 @@
 Rendered drives of 26 frames, each with another rig: standing while traffic passes (static),
 straight ahead at a steady speed, the same with a gentle sway (steady) or with vibration (bumpy), at
 0.12 m a frame (slow), and with a speed that varies (uneven). The source is 0, 1 and 2 frames late.
-The thresholds of `footage/lags.cpp` were set on seeds 0 to 2.
+The thresholds of `footage/lags.cpp` were set on seeds 0 and 1.
 """
 
 import argparse
