@@ -10,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "base/format.hpp"
 #include "base/whole_file.hpp"
 #include "xcalib/error.hpp"
 #include "xcalib/stream/files.hpp"
@@ -431,6 +432,11 @@ int join_parts(const Path& output, Codecs& codecs, const std::function<void()>& 
     const double rate = std::strtod(journal.made_with("rate").c_str(), nullptr);
     journal.append(std::move(all),
                    join_units(output, parts_of(output), units, rate, codecs, check));
+    // What the kill left half-written is the part that was to come next.
+    for (const Path& file : files_in(parts_of(output)))
+        if (const std::string whole = complete_name(file.filename().string());
+            whole.substr(0, whole.find('.')) == format("%06d", count))
+            fs::remove(file);
     remove_parts(output, parts_of(output), units);
     return count;
 }
