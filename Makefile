@@ -34,7 +34,7 @@ CPP_FILES = $(shell find bench/cpp cpp examples tests -name '*.[ch]' -o -name '*
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
     $(shell find cmake cpp python -type f -not -path '*/__pycache__/*')
 
-.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 test-native sanitize fuzz kill-test packages \
+.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 test-native test-bad-inputs sanitize fuzz kill-test packages \
     format stub clean
 help:
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
@@ -166,6 +166,9 @@ cli: | test-packages ## the command without Python, into build/release/cpp/cli
 # From the tests' folder: the package they import is the installed one.
 test-python: $(VENV)/.installed $(VENV)/.test-requires cli ## Python tests, on the installed package
 	cd tests && ../$(BIN)/python -m pytest -n auto --dist loadfile
+
+test-bad-inputs: $(VENV)/.installed $(VENV)/.test-requires cli ## each bad input on both commands
+	cd tests && XCALIB_ALL_ROWS=1 ../$(BIN)/python -m pytest -n auto bad_inputs
 
 # -- Figures --------------------------------------------------------------------------------------
 
