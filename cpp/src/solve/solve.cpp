@@ -151,9 +151,8 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
     const int lens = free_lens_coefficients(plan, stage, level.factor, rig);
-    const bool bends = rig.source.lens.bends() || rig.reference.lens.bends();
-    const bool focal =
-        plan.fits_focal && stage == 2 && (lens > 0 || (bends && level.factor < kCoarse));
+    const bool bends = rig.source.lens.bends() && level.factor < kCoarse;
+    const bool focal = plan.fits_focal && stage == 2 && (lens > 0 || bends);
     const Parameters free = free_parameters(stage, options, lens, focal);
     for (std::size_t i = 0; i < level.pairs.size() && plan.parts.images; ++i)
         problem.AddResidualBlock(
