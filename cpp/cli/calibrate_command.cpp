@@ -257,7 +257,9 @@ void add_lens(CLI::App& command, const std::string& camera, std::string& word) {
         .add_option("--" + camera + "-lens", word,
                     "Known lens of the " + camera +
                         " camera, OpenCV's model and coefficients, kept; auto: that of the initial"
-                        " rig, or none.")
+                        " rig, with --" +
+                        camera + "-intrinsics none; else " +
+                        (camera == "source" ? "k1 and k2 are estimated." : "none."))
         ->type_name("auto|none|brown:K1,K2,P1,P2[,K3[,K4,K5,K6]]|fisheye:K1,K2,K3,K4")
         ->capture_default_str();
 }

@@ -59,13 +59,15 @@ def intrinsics(
 
 def lens_option(camera: str) -> Callable[[Any], Any]:
     """``--reference-lens`` or ``--source-lens``."""
+    else_ = "k1 and k2 are estimated" if camera == "source" else "none"
     return click.option(
         f"--{camera}-lens",
         metavar="auto|none|brown:K1,K2,P1,P2[,K3[,K4,K5,K6]]|fisheye:K1,K2,K3,K4",
         default="auto",
         show_default=True,
         help=f"Known lens of the {camera} camera, OpenCV's model and coefficients, kept; auto: that"
-        f" of the initial rig, with --{camera}-intrinsics that of a bag's camera_info, or none.",
+        f" of the initial rig, with --{camera}-intrinsics that of a bag's camera_info or none; else"
+        f" {else_}.",
     )
 
 
