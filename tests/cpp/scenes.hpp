@@ -75,6 +75,16 @@ inline Rig random_rig(std::mt19937& random, int width, int height, int source_wi
                         uniform(random, -0.05, 0.05)});
 }
 
+// The same with a lens on the source, the reference or both, as `i` counts, and every second one
+// mirrored.
+inline Rig random_bent_rig(std::mt19937& random, int i, int width, int height, int source_width,
+                           int source_height) {
+    Rig rig = random_rig(random, width, height, source_width, source_height);
+    if (i % 3 != 0) rig.source.lens = random_lens(random);
+    if (i % 3 != 1) rig.reference.lens = random_lens(random);
+    return i % 2 ? with_flipped_source(rig) : rig;
+}
+
 // Eq. (3d_mapping) step by step, in double: unproject, move, project.
 inline Eigen::Vector2d mapped(const Rig& rig, double x, double y, double depth) {
     return project(rig.source, rig.R() * unproject(rig.reference, x, y, depth) + rig.t());

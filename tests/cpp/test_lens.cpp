@@ -13,8 +13,8 @@
 namespace xcalib {
 namespace {
 
+using ::xcalib::testing::random_bent_rig;
 using ::xcalib::testing::random_lens;
-using ::xcalib::testing::random_rig;
 using ::xcalib::testing::refusal;
 using ::xcalib::testing::uniform;
 
@@ -172,10 +172,7 @@ TEST(Lens, CamerasProjectAndUnprojectThroughIt) {
 TEST(Projector, RowsGoThroughBothLenses) {
     std::mt19937 random(4);
     for (int i = 0; i < 60; ++i) {
-        Rig rig = random_rig(random, 161, 120, 128, 96);
-        if (i % 3 != 0) rig.source.lens = random_lens(random);
-        if (i % 3 != 1) rig.reference.lens = random_lens(random);
-        if (i % 2) rig = with_flipped_source(rig);
+        const Rig rig = random_bent_rig(random, i, 161, 120, 128, 96);
         const Projector projector(rig);
         std::vector<float> depth(161), u(161), v(161);
         std::vector<std::uint8_t> validity(161);

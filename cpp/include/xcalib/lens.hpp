@@ -26,7 +26,7 @@ enum class LensModel { none, brown, fisheye };
 
 class Lens {
    public:
-    static constexpr std::size_t kMostCoefficients = 8;
+    static constexpr std::size_t kMaxCoefficients = 8;
 
     Lens() = default;  // none
     // none: no coefficients; brown: k1 k2 p1 p2 [k3 [k4 k5 k6]]; fisheye: k1 k2 k3 k4. Throws
@@ -82,7 +82,7 @@ class Lens {
     LensModel model_ = LensModel::none;
     std::size_t count_ = 0;
     bool bends_ = false, rational_ = false;
-    std::array<double, kMostCoefficients> coefficients_{};
+    std::array<double, kMaxCoefficients> coefficients_{};
     double max_radius_ = std::numeric_limits<double>::infinity();
 };
 

@@ -60,8 +60,8 @@ void judge(const WorkingImages& images, const Rig& rig, const Plan& plan,
         quick.options.max_iterations = std::min(plan.options.max_iterations, 12);
         Rig halves[2] = {rig, rig};
         for (std::size_t k = 0; k < 2; ++k)
-            solve_level(half_of(level, k), {}, 2, share_limit(report.valid_share), 1e-5, quick, rig,
-                        halves[k]);
+            solve_level(fold_of(level, 2, k, true), {}, 2, share_limit(report.valid_share), 1e-5,
+                        quick, rig, halves[k]);
         report.repeatability_px = median_distance(level, halves[0], halves[1]);
     }
 

@@ -20,7 +20,7 @@ namespace {
 constexpr int kCoarsest = 4, kMiddle = 2, kFinest = 1;  // levels
 constexpr int kIterations = 8;                          // of a refit at a level
 constexpr double kDeviations = 3.0;                     // of the mean difference that decide
-constexpr double kLeast = 0.002;                        // difference of the NEC that decides
+constexpr double kMinGain = 0.002;                      // difference of the NEC that decides
 constexpr double kHopeless = 5.0;         // deviations at which a lag is looked at no more
 constexpr std::size_t kEvery = SIZE_MAX;  // lags that are refitted
 
@@ -109,11 +109,11 @@ int change_of(const std::vector<Lagged>& lags) {
     const Lagged& own = lags[own_of(lags)];
     const std::size_t half = own.nec.size() / 2;
     for (const Lagged& lag : lags) {
-        if (difference(own, lag, 0, half).decides(kDeviations, kLeast) &&
-            difference(lag, own, half).decides(kDeviations, kLeast))
+        if (difference(own, lag, 0, half).decides(kDeviations, kMinGain) &&
+            difference(lag, own, half).decides(kDeviations, kMinGain))
             return lag.lag;
-        if (difference(lag, own, 0, half).decides(kDeviations, kLeast) &&
-            difference(own, lag, half).decides(kDeviations, kLeast))
+        if (difference(lag, own, 0, half).decides(kDeviations, kMinGain) &&
+            difference(own, lag, half).decides(kDeviations, kMinGain))
             return -lag.lag;
     }
     return 0;
@@ -125,7 +125,7 @@ std::vector<Lagged> hopeful(const std::vector<Lagged>& lags, std::size_t count) 
     std::vector<Lagged> kept;
     for (const Lagged& lag : lags)
         if (lag.lag == 0 || lag.lag == best.lag ||
-            (count > 2 && !difference(best, lag).decides(kHopeless, kLeast)))
+            (count > 2 && !difference(best, lag).decides(kHopeless, kMinGain)))
             kept.push_back(lag);
     return kept;
 }
@@ -231,7 +231,7 @@ LagReport fit_lags(const std::vector<ImageView>& references, const std::vector<I
             Lagged next = start_at(*at);
             refit(kCoarsest, {found, last}, plan, next);
             last = next.rig;
-            const bool hopeless = difference(lags[own_of(lags)], next).decides(kHopeless, kLeast);
+            const bool hopeless = difference(lags[own_of(lags)], next).decides(kHopeless, kMinGain);
             lags.push_back(std::move(next));
             if (hopeless) break;
         }
@@ -246,7 +246,7 @@ LagReport fit_lags(const std::vector<ImageView>& references, const std::vector<I
     for (const int factor : {kCoarsest, kMiddle, kFinest}) {
         if (factor != kCoarsest) {
             // What half the size shows clearly needs no finer look.
-            if (factor == kFinest && best_of(lags).gain.decides(kHopeless, kLeast)) break;
+            if (factor == kFinest && best_of(lags).gain.decides(kHopeless, kMinGain)) break;
             lags = hopeful(lags, factor == kFinest ? 2 : kEvery);
             if (lags.size() == 1) break;
             // Each from the rig of any: where nothing moves, one lag must not win by a better
@@ -265,7 +265,7 @@ LagReport fit_lags(const std::vector<ImageView>& references, const std::vector<I
         if (report.change != 0) break;
     }
     for (const auto& [lag, fit] : fits) report.fits.push_back(fit);
-    if (report.change == 0 && best_of(lags).gain.decides(kDeviations, kLeast))
+    if (report.change == 0 && best_of(lags).gain.decides(kDeviations, kMinGain))
         report.frames = best_of(lags).lag;
     return report;
 }

@@ -86,7 +86,7 @@ HWY_INLINE Points project(const Row& row, Float depth, Float x) {
 struct VectorLens {
     enum class Kind { none, polynomial, rational, fisheye };
     Kind kind = Kind::none;
-    std::array<float, Lens::kMostCoefficients> c{};
+    std::array<float, Lens::kMaxCoefficients> c{};
     float most = 0;  // r2 up to here has an image
 
     VectorLens() = default;

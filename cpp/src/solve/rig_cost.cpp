@@ -101,26 +101,6 @@ bool RigCost::Evaluate(double const* const* parameters, double* residuals,
     return true;
 }
 
-bool TogetherManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
-    for (int i = 0; i < 2; ++i) x_plus_delta[i] = x[i] + delta[0];
-    return true;
-}
-
-bool TogetherManifold::PlusJacobian(const double*, double* jacobian) const {
-    std::fill_n(jacobian, 2, 1.0);
-    return true;
-}
-
-bool TogetherManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
-    y_minus_x[0] = 0.5 * (y[0] - x[0] + y[1] - x[1]);
-    return true;
-}
-
-bool TogetherManifold::MinusJacobian(const double*, double* jacobian) const {
-    std::fill_n(jacobian, 2, 0.5);
-    return true;
-}
-
 bool PanTiltManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
     const double full[3] = {delta[0], delta[1], 0.0};
     return quaternion_.Plus(x, full, x_plus_delta);

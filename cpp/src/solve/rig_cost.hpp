@@ -1,6 +1,7 @@
 // What Ceres needs to know of a rig: costs of its parameters, and a manifold of its rotation.
 #pragma once
 
+#include <ceres/autodiff_manifold.h>
 #include <ceres/ceres.h>
 
 #include <vector>
@@ -47,15 +48,19 @@ class RigCost : public ceres::CostFunction {
 };
 
 // Two numbers that move by the same.
-class TogetherManifold : public ceres::Manifold {
-   public:
-    int AmbientSize() const override { return 2; }
-    int TangentSize() const override { return 1; }
-    bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
-    bool PlusJacobian(const double* x, double* jacobian) const override;
-    bool Minus(const double* y, const double* x, double* y_minus_x) const override;
-    bool MinusJacobian(const double* x, double* jacobian) const override;
+struct MoveTogether {
+    template <class T>
+    bool Plus(const T* x, const T* delta, T* x_plus_delta) const {
+        for (int i = 0; i < 2; ++i) x_plus_delta[i] = x[i] + delta[0];
+        return true;
+    }
+    template <class T>
+    bool Minus(const T* y, const T* x, T* y_minus_x) const {
+        y_minus_x[0] = 0.5 * (y[0] - x[0] + y[1] - x[1]);
+        return true;
+    }
 };
+using TogetherManifold = ceres::AutoDiffManifold<MoveTogether, 2, 1>;
 
 // A rotation that may pan and tilt but not roll: stage 1 freezes the roll.
 class PanTiltManifold : public ceres::Manifold {

@@ -272,13 +272,13 @@ Level make_level(const WorkingImages& images, int factor, const Rig& rig, int nu
     return level;
 }
 
-Level part_of(const Level& level, const std::function<bool(std::size_t)>& takes) {
+Level fold_of(const Level& level, std::size_t folds, std::size_t fold, bool inside) {
     Level part = level;
     part.pairs.clear();
     part.weights.clear();
     double sum = 0;
     for (std::size_t i = 0; i < level.pairs.size(); ++i) {
-        if (!takes(i)) continue;
+        if ((i % folds == fold) != inside) continue;
         part.pairs.push_back(level.pairs[i]);
         part.weights.push_back(level.weights[i]);
         sum += level.weights[i];
@@ -286,10 +286,6 @@ Level part_of(const Level& level, const std::function<bool(std::size_t)>& takes)
     for (double& weight : part.weights)
         weight = sum > 0 ? weight / sum : 1.0 / static_cast<double>(part.pairs.size());
     return part;
-}
-
-Level half_of(const Level& level, std::size_t first) {
-    return part_of(level, [&](std::size_t i) { return i % 2 == first; });
 }
 
 }  // namespace xcalib

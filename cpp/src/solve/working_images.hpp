@@ -1,7 +1,6 @@
 // The caller's frames as the calibration works on them, and their pyramid.
 #pragma once
 
-#include <functional>
 #include <map>
 #include <memory>
 #include <vector>
@@ -71,10 +70,8 @@ struct Level {
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 // Its sizes only, for sources no finer than the reference.
 Level make_sizes(const WorkingImages& images, int factor, const Rig& rig);
-// The pairs of these indices of a level.
-Level part_of(const Level& level, const std::function<bool(std::size_t)>& takes);
-// Every second one.
-Level half_of(const Level& level, std::size_t first);
+// Every `folds`-th pair of a level from `fold` on, or all but those.
+Level fold_of(const Level& level, std::size_t folds, std::size_t fold, bool inside);
 // The same with the NEC at any factor.
 Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 
