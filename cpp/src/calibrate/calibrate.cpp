@@ -183,7 +183,7 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
         if (progress) progress(stage, share);
     };
     Plan plan(options, flow, parts);
-    if (initial) plan.fits_focal = false;  // it is known, as is a lens that it has
+    if (initial) plan.fits_gauge = false;  // it is known, as is a lens that it has
     if (initial && initial->source.lens.bends()) plan.estimates_lens = false;
     validate(references, sources, depths, initial, options);
 
