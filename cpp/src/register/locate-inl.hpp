@@ -86,17 +86,21 @@ HWY_INLINE Located locate(const AnyRow& row, Float depth, Float x, int column) {
     return row.bends ? locate(row.bent, depth, column) : locate(row.straight, depth, x);
 }
 
-// A row of the caller's depth.
+// A row of depth: the caller's as it is, or one made of it.
 struct DepthRow {
     const char* data;
     std::ptrdiff_t stride;  // [bytes] to the next
     int bytes;              // a pixel's
     Float scale;
 
-    HWY_INLINE DepthRow(const DepthView& depth, int y)
-        : data(depth.view.row<char>(y)), stride(depth.view.row_bytes),
-          bytes(depth.view.type == PixelType::u16 ? 2 : 4),
-          scale(hn::Set(FloatTag(), depth.scale)) {}
+    HWY_INLINE DepthRow(const DepthRows& rows, int y, DepthRows::Room& room) {
+        const DepthView& depth = rows.given();
+        const bool given = !rows.resizes();
+        data = given ? depth.view.row<char>(y) : reinterpret_cast<const char*>(rows.row(y, room));
+        stride = given ? depth.view.row_bytes : 0;
+        bytes = given && depth.view.type == PixelType::u16 ? 2 : 4;
+        scale = hn::Set(FloatTag(), depth.scale);
+    }
 
     // From pixel x on, of which a vector is there.
     HWY_INLINE Float load(int x) const {

@@ -40,7 +40,7 @@ HWY_INLINE void sample(const RowsTask& task, const Source& source, const AnyRow&
 
 template <class T, int kChannels>
 void register_rows_of(const RowsTask& task, int begin, int end) {
-    const int width = task.depth.view.width;
+    const int width = task.depth->width();
     const Source source(task.source);
     T pixels[kLanes * kChannels];  // of the last, incomplete vector of a row
     std::uint8_t codes[kLanes];
@@ -52,7 +52,7 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
         const Reach reach = reach_of<T>(source, task.projector->step_along_row(width / 2, y));
 #endif
         const AnyRow row(*task.projector, y, kHalfBack);
-        const DepthRow depth(task.depth, y);
+        const DepthRow depth(*task.depth, y, *task.room);
         T* out = reinterpret_cast<T*>(static_cast<char*>(task.registered.data) +
                                       y * task.registered.row_bytes);
         std::uint8_t* mask = task.mask + static_cast<std::size_t>(y) * width;
@@ -100,11 +100,11 @@ void register_rows(const RowsTask& task, int begin, int end) {
 
 void map_rows(const RowsTask& task, int begin, int end, float* map) {
     const FloatTag d;
-    const int width = task.depth.view.width;
+    const int width = task.depth->width();
     const Float none = set(std::numeric_limits<double>::quiet_NaN());
     for (int y = begin; y < end; ++y) {
         const AnyRow row(*task.projector, y, kHalfBack);
-        const DepthRow depth(task.depth, y);
+        const DepthRow depth(*task.depth, y, *task.room);
         float* out = map + 2 * static_cast<std::size_t>(y) * width;
         Float along = hn::Iota(d, 0.0f);
         for (int x = 0; x < width; x += kLanes, along = hn::Add(along, set(double{kLanes}))) {

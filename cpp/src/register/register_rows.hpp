@@ -4,20 +4,15 @@
 #include <cstdint>
 
 #include "geometry/projector.hpp"
+#include "images/depth_rows.hpp"
 #include "register/cells.hpp"
 #include "xcalib/image.hpp"
 
 namespace xcalib {
 
-// Depth as the caller has it: float32 [m], or uint16 in units of `scale` metres.
-struct DepthView {
-    ImageView view;
-    float scale = 1;
-};
-
 // Raises the cells to the nearness of the points of rows [begin, end) that fall in them.
-void splat_rows(const Projector& projector, const DepthView& depth, const CellGrid& grid, int begin,
-                int end, Nearness* cells);
+void splat_rows(const Projector& projector, const DepthRows& depth, DepthRows::Room& room,
+                const CellGrid& grid, int begin, int end, Nearness* cells);
 
 // Rows [begin, end) of the cells of all `count` parts as one: the nearest of each, and where both
 // neighbours, left and right or above and below, are nearer, the farther of these: a surface whose
@@ -28,7 +23,8 @@ void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begi
 // What all rows of a frame have in common. `cells` is null where occlusion is not looked for.
 struct RowsTask {
     const Projector* projector;
-    DepthView depth;
+    const DepthRows* depth;
+    DepthRows::Room* room;  // the thread's
     const CellGrid* grid;
     const Nearness* cells;
     bool hide;  // occluded pixels are 0 in the image, and NaN in the map

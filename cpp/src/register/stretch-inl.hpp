@@ -69,7 +69,7 @@ HWY_INLINE void locate(const RowsTask& task, const AnyRow& row, const DepthRow& 
                        int begin, int count, const char* out, int vector_bytes, Stretch& stretch) {
     const FloatTag d;
     const Float least =
-        hn::Set(d, bends ? 0.0f : task.projector->least_depth(y, task.depth.view.width));
+        hn::Set(d, bends ? 0.0f : task.projector->least_depth(y, task.depth->width()));
     Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
     for (int i = 0; i < count; ++i) {
         UsualVector& vector = stretch.vectors[i];
