@@ -12,7 +12,7 @@ import click
 
 from .errors import ErrorsInOneLine, open_standard_streams
 
-COMMANDS = ("calibrate", "demo", "evaluate", "inspect", "models", "register", "report")
+COMMANDS = ("calibrate", "convert", "demo", "evaluate", "inspect", "models", "register", "report")
 
 
 class Commands(ErrorsInOneLine):

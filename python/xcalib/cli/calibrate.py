@@ -19,7 +19,7 @@ from .._core import (
 )
 from ..flow import FlowProvider, NetworkFlow
 from ..footage import lens_of_topic
-from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
+from ..frames import Image, InputError, check_file_writable, same_aspect, size_of, write_bytes
 from ..pipeline import choose_by_content, run_calibration, save_rig, with_fitted_plane
 from .arguments import (
     COUNT,
@@ -44,10 +44,15 @@ LAG_ROUNDS = 2
 
 def intrinsics(
     ctx: click.Context, param: click.Parameter, value: str | None
-) -> tuple[float, float, float, float] | None:
-    """Parse ``FX,FY,CX,CY`` in pixels."""
+) -> tuple[float, float, float, float] | Pinhole | None:
+    """Parse ``FX,FY,CX,CY`` in pixels, or read the camera of a file."""
     if value is None:
         return None
+    if Path(value).exists():
+        from ..convert import read_camera  # seldom needed, and it loads much
+
+        assert param.name is not None
+        return read_camera(value, param.name.removesuffix("_intrinsics"))
     try:
         fx, fy, cx, cy = (float(part) for part in value.split(","))
     except ValueError:
@@ -55,6 +60,22 @@ def intrinsics(
     if not (fx > 0 and fy > 0 and all(map(math.isfinite, (fx, fy, cx, cy)))):
         raise click.BadParameter(f"{value!r}: expected finite numbers, FX and FY above 0 px")
     return fx, fy, cx, cy
+
+
+def known_camera(
+    given: tuple[float, float, float, float] | Pinhole, image: Image, topic: str, lens: str
+) -> Pinhole:
+    """The camera of ``--reference-intrinsics`` or ``--source-intrinsics`` behind an image."""
+    if isinstance(given, Pinhole):
+        size, own = size_of(image), (given.width, given.height)
+        if not same_aspect(size, own):
+            raise InputError(
+                f"the camera given is of {own[0]}x{own[1]} px, the images are {size[0]}x{size[1]};"
+                " expected the same aspect"
+            )
+        return given if size == own else given.resized(*size)
+    found = lens_of_topic(topic) if lens == "auto" else None
+    return Pinhole(*size_of(image), *given, lens=found or Lens())
 
 
 def lens_option(camera: str) -> Callable[[Any], Any]:
@@ -175,15 +196,19 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 )
 @click.option(
     "--reference-intrinsics",
-    metavar="FX,FY,CX,CY",
+    metavar="FX,FY,CX,CY|FILE",
     callback=intrinsics,
-    help="Known intrinsics of the reference camera, kept [px].  [default: none]",
+    help="Known intrinsics of the reference camera, kept [px], or a file that `xcalib convert`"
+    " reads, with its lens."
+    "  [default: none]",
 )
 @click.option(
     "--source-intrinsics",
-    metavar="FX,FY,CX,CY",
+    metavar="FX,FY,CX,CY|FILE",
     callback=intrinsics,
-    help="Known intrinsics of the source camera, kept [px].  [default: none, estimated]",
+    help="Known intrinsics of the source camera, kept [px], or a file that `xcalib convert`"
+    " reads, with its lens."
+    "  [default: none, estimated]",
 )
 @lens_option("reference")
 @lens_option("source")
@@ -238,8 +263,8 @@ def command(
     max_fov_ratio: float,
     flow_spec: str,
     solver: str,
-    reference_intrinsics: tuple[float, float, float, float] | None,
-    source_intrinsics: tuple[float, float, float, float] | None,
+    reference_intrinsics: tuple[float, float, float, float] | Pinhole | None,
+    source_intrinsics: tuple[float, float, float, float] | Pinhole | None,
     reference_lens: str,
     source_lens: str,
     reference_hfov: float | None,
@@ -291,14 +316,12 @@ def command(
 
     def set_cameras(calibration: CalibrationOptions, reference: Image, source: Image) -> None:
         if reference_intrinsics:
-            lens = lens_of_topic(inputs["reference"]) if reference_lens == "auto" else None
-            calibration.reference_camera = Pinhole(
-                *size_of(reference), *reference_intrinsics, lens=lens or Lens()
+            calibration.reference_camera = known_camera(
+                reference_intrinsics, reference, inputs["reference"], reference_lens
             )
         if source_intrinsics:
-            lens = lens_of_topic(inputs["source"]) if source_lens == "auto" else None
-            calibration.source_camera = Pinhole(
-                *size_of(source), *source_intrinsics, lens=lens or Lens()
+            calibration.source_camera = known_camera(
+                source_intrinsics, source, inputs["source"], source_lens
             )
 
     initial_rig = load_rig(initial) if initial else None
