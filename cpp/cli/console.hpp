@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace xcalib::cli {
 
@@ -31,7 +32,8 @@ class ClosedPipe : public std::runtime_error {
 class Console {
    public:
     bool json = false;
-    bool quiet = false;  // no progress
+    bool quiet = false;                  // no progress
+    std::vector<std::string> arguments;  // of the program
 
     void line(const std::string& text);  // a result, for people; not with --json
     void result(const Json& fields);     // a result, for machines; only with --json

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from xcalib import metrics
+    from xcalib import convert, metrics
     from xcalib._core import (
         AdamOptions,
         CalibrationOptions,
@@ -38,8 +38,8 @@ else:
         """Import what a name stands for when it is first used: `xcalib --version` needs nothing."""
         if name == "__version__":
             value = import_module("importlib.metadata").version("xcalib-rgbt")
-        elif name == "metrics":
-            value = import_module("xcalib.metrics")
+        elif name in ("convert", "metrics"):
+            value = import_module(f"xcalib.{name}")
         elif name == "choose_frames":
             value = import_module("xcalib.choose").choose_frames
         elif name in __all__:
@@ -71,6 +71,7 @@ __all__ = [
     "SearchOptions",
     "calibrate",
     "choose_frames",
+    "convert",
     "fit_lags",
     "metrics",
 ]

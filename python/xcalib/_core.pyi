@@ -984,9 +984,19 @@ def _option_words() -> dict[str, list[str]]:
 def _flow_arguments() -> dict[str, str]:
     """CalibrationOptions.flow by what --flow of the command takes."""
 
-def report_document(report: CalibrationReport, rig_file: str, files: Sequence[str]) -> str:
-    """JSON text of a report, as `xcalib calibrate --report` writes it; files: those of its
-    frames.
+def report_document(
+    report: CalibrationReport,
+    rig_file: str,
+    files: Sequence[str],
+    arguments: Sequence[str],
+    directory: str,
+    lag: int,
+    choice: Sequence[tuple[str, bool, str]],
+) -> str:
+    """JSON text of a report, as `xcalib calibrate --report` writes it.
+
+    files: those of its frames. arguments: of `xcalib`, which was run in directory. lag: of the
+    sources, that was taken up [frames]. choice: (file, taken, reason) of the frames looked at.
     """
 
 def evaluation_document(evaluation: Evaluation, rig_file: str, files: Sequence[str]) -> str:

@@ -102,6 +102,17 @@ Json json_of(const LagReport& lag) {
     return {{"frames", lag.frames}, {"change", lag.change}, {"fits", fits}};
 }
 
+Json json_of(const RunFacts& run) {
+    Json choice = Json::array();
+    for (const RunFacts::Frame& frame : run.choice)
+        choice.push_back({{"file", frame.file}, {"taken", frame.taken}, {"reason", frame.reason}});
+    return {{"program", run.program},
+            {"arguments", run.arguments},
+            {"directory", run.directory},
+            {"lag", run.lag},
+            {"choice", choice}};
+}
+
 std::string text_of(const Json& document) {
     return document.dump(2, ' ', true, Json::error_handler_t::replace);
 }
@@ -170,8 +181,12 @@ Json json_of(const Rig& rig) {
 }
 
 std::string report_document(const CalibrationReport& report, const std::string& rig_file,
-                            const std::vector<std::string>& files) {
-    Json document{{"format", "xcalib-report"}, {"version", 1}, {"rig", rig_file}, {"files", files}};
+                            const std::vector<std::string>& files, const RunFacts& run) {
+    Json document{{"format", "xcalib-report"},
+                  {"version", 1},
+                  {"rig", rig_file},
+                  {"files", files},
+                  {"run", json_of(run)}};
     document.update(json_of(report));
     return text_of(document) + "\n";
 }
