@@ -37,4 +37,10 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
                             const Progress& progress = nullptr,
                             const FlowEstimator& flow = nullptr);
 
+// How far off each pixel of the reference is expected to be at a depth [m]: the length that `share`
+// of errors there, (0, 1), do not exceed [px of the reference when its width is 640 px], drawn on a
+// grid of this size that covers the image. NaN where the source sees nothing of it.
+Image expected_error_map(const CalibrationReport& report, double depth, int width, int height,
+                         double share = 0.5);
+
 }  // namespace xcalib

@@ -7,9 +7,11 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <memory>
 #include <optional>
 
 #include "xcalib/export.hpp"
+#include "xcalib/verdict.hpp"
 
 namespace XCALIB_EXPORT xcalib {
 
@@ -77,6 +79,8 @@ struct Rig {
     // The source's image is a mirror image: its columns count against the camera's x axis,
     // u = cx - fx X/Z + skew Y/Z.
     bool source_mirrored = false;
+    // Of the calibration that estimated it; none: unknown.
+    std::shared_ptr<const Verdict> verdict = nullptr;
 
     Eigen::Matrix3d R() const { return source_from_reference.rotation.toRotationMatrix(); }
     const Eigen::Vector3d& t() const { return source_from_reference.translation; }

@@ -6,11 +6,14 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "base/format.hpp"
 #include "base/parallel.hpp"
 #include "calibrate/adam.hpp"
 #include "calibrate/find_mounts.hpp"
+#include "calibrate/halves.hpp"
 #include "calibrate/relative_depth.hpp"
 #include "calibrate/start.hpp"
+#include "calibrate/static_edges.hpp"
 #include "calibrate/study.hpp"
 #include "calibrate/verdict.hpp"
 #include "solve/solve.hpp"
@@ -116,14 +119,15 @@ void settle_relative_depth(Attempt& attempt, CalibrationResult& result) {
 }
 
 // From a rig to a result: what is left once it is solved.
-void settle(Attempt& attempt, CalibrationResult& result) {
+void settle(Attempt& attempt, const Halves& halves, CalibrationResult& result) {
     CalibrationReport& report = result.report;
-    if (attempt.plan.options.relative_depth) settle_relative_depth(attempt, result);
     report.nec = report.levels.back().nec;
     report.valid_share = report.levels.back().valid_share;
-    judge(*attempt.images, result.rig, attempt.plan, report);
+    judge(*attempt.images, result.rig, halves, attempt.plan, report);
+    if (attempt.plan.options.relative_depth) settle_relative_depth(attempt, result);
     result.converged = report.converged;
     result.rig = attempt.given(result.rig);
+    result.rig.verdict = std::make_shared<const Verdict>(report.verdict);
     const std::string mount = Mount::of(result.rig).text();
     if (mount != Mount{}.text()) report.message += "; the source image is " + mount;
     for (CandidateReport& candidate : report.candidates) {
@@ -132,26 +136,69 @@ void settle(Attempt& attempt, CalibrationResult& result) {
     }
 }
 
-// The best start of the mounts that the footage may have, and how it is looked at; none where the
-// edges of no other agree clearly better than those of `upright`.
-struct Turned {
-    Attempt attempt;
-    Start start;
-};
-std::optional<Turned> best_turned(const std::shared_ptr<const WorkingImages>& images,
-                                  const ImageView& reference, const ImageView& source,
-                                  const Plan& plan, const Start& upright) {
+// The same where nothing was searched.
+void settle_refit(Attempt& attempt, CalibrationResult& result) {
+    settle(attempt,
+           refit_halves(*attempt.images, result.rig, attempt.plan,
+                        result.report.levels.back().valid_share),
+           result);
+}
+
+// Two calibrations, each of half of the frames, and from the better of them one of all. Returns how
+// well edges agree at its start.
+double fit(Attempt& attempt, const ImageView& reference, const ImageView& source,
+           const Progress& notify, double& search_seconds, CalibrationResult& result) {
+    const Plan& plan = attempt.plan;
+    if (!plan.searches) {  // there is nothing that two halves could find apart
+        const Start start =
+            find_start(*attempt.images, reference, source, attempt.initial, plan,
+                       [&](double share) { notify("search", 0.05 + 0.55 * share); });
+        search_seconds += start.search_seconds;
+        refine(*attempt.images, start, plan, notify, result);
+        settle_refit(attempt, result);
+        return start.merit;
+    }
+    const CalibrationResult empty = result;
+    const auto refine_half = [&](const WorkingImages& half, const Start& start) {
+        CalibrationResult out = empty;
+        refine(
+            half, start, plan, [](const std::string&, double) {}, out);
+        return out.rig;
+    };
+    const Halves halves =
+        fit_halves(*attempt.images, reference, source, attempt.initial, plan, refine_half,
+                   [&](double share) { notify("search", 0.05 + 0.55 * share); });
+    std::optional<Start> start = halves.start;
+    // Where they disagree, half of the frames may have been too few.
+    if (!agree(halves, *attempt.images)) {
+        Start whole =
+            find_start(*attempt.images, reference, source, attempt.initial, plan, [](double) {});
+        if (!start || merit_on(*attempt.images, whole.rig, plan) >
+                          merit_on(*attempt.images, start->rig, plan))
+            start = std::move(whole);
+    }
+    search_seconds += start->search_seconds;
+    refine(*attempt.images, *start, plan, notify, result);
+    settle(attempt, halves, result);
+    return start->merit;
+}
+
+// The best of the mounts that the footage may have, and how it is looked at; none where the edges
+// of no other agree clearly better than those of the upright one.
+std::optional<Attempt> best_turned(const std::shared_ptr<const WorkingImages>& images,
+                                   const ImageView& reference, const ImageView& source,
+                                   const Plan& plan, double upright_merit) {
     constexpr std::size_t kMounts = 2;
     constexpr double kClearly = 1.15;
-    std::optional<Turned> best;
-    double merit = kClearly * upright.merit;
+    std::optional<Attempt> best;
+    double merit = kClearly * upright_merit;
     for (const Mount& mount : find_mounts(*images, reference, source, plan, kMounts)) {
         Attempt attempt(images, plan, std::nullopt, mount);
-        Start start = find_start(*attempt.images, reference, source, std::nullopt, attempt.plan,
-                                 [](double) {});
+        const Start start = find_start(*attempt.images, reference, source, std::nullopt,
+                                       attempt.plan, [](double) {});
         if (start.merit <= merit) continue;
         merit = start.merit;
-        best = Turned{std::move(attempt), std::move(start)};
+        best = std::move(attempt);
     }
     return best;
 }
@@ -176,8 +223,9 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     result.report.frames =
         draw_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
     notify("prepare", 0.0);
-    const auto images = std::make_shared<const WorkingImages>(
-        make_working_images(references, sources, depths, result.report.frames, plan));
+    double still = 0;
+    const auto images = std::make_shared<const WorkingImages>(without_static_edges(
+        make_working_images(references, sources, depths, result.report.frames, plan), still));
     result.report.working_width = images->references[0].width;
     result.report.working_height = images->references[0].height;
 
@@ -191,26 +239,23 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
         solve_adam(
             *attempt.images, attempt.plan,
             [&](double share) { notify("refine", 0.05 + 0.9 * share); }, result.rig, result.report);
-        settle(attempt, result);
+        settle_refit(attempt, result);
     } else {
         notify("search", 0.05);
-        const Start found =
-            find_start(*attempt.images, references[0], sources[0], attempt.initial, attempt.plan,
-                       [&](double share) { notify("search", 0.05 + 0.55 * share); });
-        search_seconds = found.search_seconds;
         const CalibrationResult empty = result;
-        refine(*attempt.images, found, attempt.plan, notify, result);
-        settle(attempt, result);
-        if (!result.converged && plan.searches && !initial && !options.mount) {
+        const double upright =
+            fit(attempt, references[0], sources[0], notify, search_seconds, result);
+        if (!result.report.verdict.found && plan.searches && !initial && !options.mount) {
             notify("mount", 0.96);
-            if (auto turned = best_turned(images, references[0], sources[0], plan, found)) {
+            if (auto turned = best_turned(images, references[0], sources[0], plan, upright)) {
                 result = empty;
-                refine(*turned->attempt.images, turned->start, turned->attempt.plan, notify,
-                       result);
-                settle(turned->attempt, result);
+                fit(*turned, references[0], sources[0], notify, search_seconds, result);
             }
         }
     }
+    if (still > 0)
+        result.report.message += format(
+            "; what stands still in the reference (%.1f %% of its edges) is left out", 100 * still);
     notify("judge", 1.0);
     result.report.seconds = seconds_now() - start;
     result.report.time = images->times->seconds(resolve_threads(options.num_threads));

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 
 #include "base/parallel.hpp"
 #include "solve/solve.hpp"
@@ -17,13 +16,6 @@ constexpr double kDegree = 3.14159265358979323846 / 180;
 // A camera of unknown intrinsics but its horizontal field of view.
 Pinhole camera_guess(const ImageView& image, double hfov) {
     return Pinhole::from_hfov(image.width, image.height, hfov);
-}
-
-// What candidates are compared by: how well edges agree beyond chance, and over how much of the
-// image. Chance grows as the overlap shrinks. `value`: a NecValue or a LevelReport.
-template <class Value>
-double merit(const Value& value) {
-    return value.aligned * std::sqrt(value.valid_share);
 }
 
 // Where the field of view of the reference makes little difference, it is the paper's 45 deg.
@@ -280,7 +272,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         found = {given};
     }
     if (found.empty())
-        throw std::runtime_error("the search found no displacement at which the images overlap");
+        throw NothingFound("the search found no displacement at which the images overlap");
     out.search_seconds = seconds_now() - start;
     progress(0.4);
 

@@ -33,22 +33,7 @@ class HoldCost : public ceres::CostFunction {
     std::vector<double> held_;
 };
 
-// What moves in a stage: all but the paper's frozen sets, and what is known.
-Parameters free_parameters(int stage, const CalibrationOptions& options) {
-    const bool source_free = !options.source_camera;
-    const bool reference_free = options.optimize_reference && !options.reference_camera;
-    Parameters free(0);
-    for (int p = 0; p < kNumParameters; ++p) {
-        const bool late = p == kRotationZ || p == kTranslationZ || p == kSourceCx ||
-                          p == kSourceCy || p == kSourceSkew || p >= kReferenceCx;
-        const bool known =
-            (p <= kSourceSkew && !source_free) || (p >= kReferenceLogFx && !reference_free);
-        if (!known && !(stage == 1 && late)) free.add(p);
-    }
-    return free;
-}
-
-// The same for Ceres.
+// What does not move in a stage, for Ceres.
 void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
             const CalibrationOptions& options) {
     const bool source_known = options.source_camera.has_value();
@@ -90,6 +75,20 @@ double condition_number(ceres::Problem& problem) {
 }
 
 }  // namespace
+
+Parameters free_parameters(int stage, const CalibrationOptions& options) {
+    const bool source_free = !options.source_camera;
+    const bool reference_free = options.optimize_reference && !options.reference_camera;
+    Parameters free(0);
+    for (int p = 0; p < kNumParameters; ++p) {
+        const bool late = p == kRotationZ || p == kTranslationZ || p == kSourceCx ||
+                          p == kSourceCy || p == kSourceSkew || p >= kReferenceCx;
+        const bool known =
+            (p <= kSourceSkew && !source_free) || (p >= kReferenceLogFx && !reference_free);
+        if (!known && !(stage == 1 && late)) free.add(p);
+    }
+    return free;
+}
 
 double seconds_now() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())

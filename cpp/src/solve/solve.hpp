@@ -19,6 +19,9 @@ LevelReport report_on(const Level& level, int stage, const Rig& rig, int num_thr
 // The valid share below which a fit is penalised that starts where it is `valid_share`.
 inline double share_limit(double valid_share) { return 0.8 * valid_share; }
 
+// What moves in a stage: all but the paper's frozen sets, and what is known.
+Parameters free_parameters(int stage, const CalibrationOptions& options);
+
 // Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and a prior
 // that holds `anchor`, stage 2 everything free. A pair whose valid share falls below `share_limit`
 // is penalised for it. It stops where a step lowers the cost by less than the share `tolerance`.
