@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "xcalib/camera.hpp"
+
 namespace xcalib::cli {
 
 using Json = nlohmann::ordered_json;
@@ -21,6 +23,9 @@ Json number(double value);
 class NotTrusted : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
+
+// The same, for a rig whose calibration was not.
+void require_trusted(const Rig& rig, const std::string& file);
 
 class Console {
    public:

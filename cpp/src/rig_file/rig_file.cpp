@@ -11,6 +11,7 @@
 #include <fstream>
 #include <initializer_list>
 #include <iterator>
+#include <limits>
 #include <locale>
 #include <sstream>
 #include <stdexcept>
@@ -56,16 +57,23 @@ class Section {
         return node_[key].Scalar();
     }
 
-    int size(const char* key) const {
-        int value = 0;
-        const std::string text = node_[key].IsScalar() ? node_[key].Scalar() : "";
-        const char* const end = text.data() + text.size();
-        if (std::from_chars(text.data(), end, value).ptr != end || value < 1)
-            fail(key, scalar(node_[key]), "a whole number of px, at least 1");
+    int size(const char* key) const { return whole(key, "a whole number of px, at least 1"); }
+    int count(const char* key) const { return whole(key, "a whole number, at least 1"); }
+
+    double number(const char* key) const { return number(key, node_[key]); }
+
+    // A depth [m], .inf for what is far.
+    double depth(const char* key) const {
+        const double value = length(key, node_[key]);
+        if (!(value > 0)) fail(key, scalar(node_[key]), "a depth > 0 or .inf");
         return value;
     }
 
-    double number(const char* key) const { return number(key, node_[key]); }
+    bool flag(const char* key) const {
+        const std::string word = text(key);
+        if (word != "true" && word != "false") fail(key, word, "true or false");
+        return word == "true";
+    }
 
     std::vector<double> numbers(const char* key, std::size_t count) const {
         const YAML::Node list = node_[key];
@@ -82,7 +90,31 @@ class Section {
         reject(path_, name_ + "." + key + " = " + value + ", expected " + expected);
     }
 
+    // Lengths, each of which may be .inf.
+    std::vector<double> lengths(const char* key, std::size_t count) const {
+        const YAML::Node list = node_[key];
+        if (!list.IsSequence() || list.size() != count)
+            fail(key, scalar(list), "a list of " + std::to_string(count) + " lengths");
+        std::vector<double> out;
+        for (const YAML::Node& item : list) out.push_back(length(key, item));
+        return out;
+    }
+
    private:
+    double length(const char* key, const YAML::Node& node) const {
+        const bool infinite = node.IsScalar() && node.Scalar() == ".inf";
+        const double value = infinite ? std::numeric_limits<double>::infinity() : number(key, node);
+        if (!(value >= 0)) fail(key, scalar(node), "a length >= 0 or .inf");
+        return value;
+    }
+    int whole(const char* key, const char* expected) const {
+        int value = 0;
+        const std::string text = node_[key].IsScalar() ? node_[key].Scalar() : "";
+        const char* const end = text.data() + text.size();
+        if (std::from_chars(text.data(), end, value).ptr != end || value < 1)
+            fail(key, scalar(node_[key]), expected);
+        return value;
+    }
     static std::string scalar(const YAML::Node& node) {
         return node.IsScalar() ? node.Scalar() : "(not a single value)";
     }
@@ -125,10 +157,78 @@ void write_camera(std::ostream& out, const char* name, const Pinhole& camera) {
         << "  skew: " << text_of(camera.skew) << "\n";
 }
 
+// [median, 95 %]; either may be .inf.
+ExpectedError read_error(const Section& section, const char* key) {
+    const std::vector<double> values = section.lengths(key, 2);
+    return {values[0], values[1]};
+}
+
+Verdict read_verdict(const std::string& path, const YAML::Node& node) {
+    const Section section(
+        path, "calibration", node,
+        {"trusted", "found", "reason", "expected_error_px", "frames", "date", "software"},
+        {"advice", "error_by_depth"});
+    Verdict verdict;
+    verdict.trusted = section.flag("trusted");
+    verdict.found = section.flag("found");
+    verdict.reason = section.text("reason");
+    if (section.node("advice")) verdict.advice = section.text("advice");
+    verdict.expected_error = read_error(section, "expected_error_px");
+    verdict.frames = section.count("frames");
+    verdict.date = section.text("date");
+    verdict.software = section.text("software");
+    if (const YAML::Node table = section.node("error_by_depth")) {
+        if (!table.IsSequence())
+            section.fail("error_by_depth", "(not a list)", "a list of depths and errors");
+        for (const YAML::Node& item : table) {
+            const Section row(path, "calibration.error_by_depth", item, {"depth_m", "error_px"});
+            const double depth = row.depth("depth_m");
+            if (!verdict.by_depth.empty() && !(depth > verdict.by_depth.back().depth))
+                row.fail("depth_m", item["depth_m"].Scalar(), "more than that of the row before");
+            verdict.by_depth.push_back({depth, read_error(row, "error_px")});
+        }
+    }
+    return verdict;
+}
+
+// In quotes, as YAML reads them back.
+std::string quoted(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) {
+        if (c == '"' || c == '\\') out += '\\';
+        out += c == '\n' ? ' ' : c;
+    }
+    return out + "\"";
+}
+
+std::string length_text(double value) { return std::isinf(value) ? ".inf" : text_of(value); }
+
+std::string error_text(const ExpectedError& error) {
+    return "[" + length_text(error.median) + ", " + length_text(error.p95) + "]";
+}
+
+void write_verdict(std::ostream& out, const Verdict& verdict) {
+    const auto word = [](bool value) { return value ? "true" : "false"; };
+    out << "calibration:\n"
+        << "  trusted: " << word(verdict.trusted) << "\n"
+        << "  found: " << word(verdict.found) << "\n"
+        << "  reason: " << quoted(verdict.reason) << "\n";
+    if (!verdict.advice.empty()) out << "  advice: " << quoted(verdict.advice) << "\n";
+    // Median and 95 %, of the reference at 640 px of width.
+    out << "  expected_error_px: " << error_text(verdict.expected_error) << "\n";
+    if (!verdict.by_depth.empty()) out << "  error_by_depth:\n";
+    for (const ErrorAtDepth& row : verdict.by_depth)
+        out << "    - {depth_m: " << length_text(row.depth)
+            << ", error_px: " << error_text(row.error) << "}\n";
+    out << "  frames: " << verdict.frames << "\n"
+        << "  date: " << quoted(verdict.date) << "\n"
+        << "  software: " << quoted(verdict.software) << "\n";
+}
+
 Rig parse_rig(const std::string& path, const YAML::Node& root) {
     const Section file(path, "the file", root,
                        {"format", "version", "reference", "source", "source_from_reference"},
-                       {"relative_depth", "source_mirrored"});
+                       {"relative_depth", "source_mirrored", "calibration"});
     if (file.text("format") != "xcalib-rig") file.fail("format", file.text("format"), "xcalib-rig");
     if (file.text("version") != "1" && file.text("version") != "2")
         file.fail("version", file.text("version"), "1 or 2");
@@ -146,10 +246,10 @@ Rig parse_rig(const std::string& path, const YAML::Node& root) {
         rig.relative_depth = RelativeDepth{relative.number("scale"), relative.number("shift")};
     }
     if (file.node("source_mirrored")) {
-        const std::string word = file.text("source_mirrored");
-        if (word != "true" && word != "false") file.fail("source_mirrored", word, "true or false");
-        rig.source_mirrored = word == "true";
+        rig.source_mirrored = file.flag("source_mirrored");
     }
+    if (const YAML::Node node = file.node("calibration"))
+        rig.verdict = std::make_shared<const Verdict>(read_verdict(path, node));
     try {
         rig.validate();
     } catch (const std::invalid_argument& error) {
@@ -181,7 +281,7 @@ void save_rig(const Rig& rig, const std::string& path) {
     std::ostringstream out;
     out.imbue(std::locale::classic());
     // Software from before version 2 reads what needs nothing of it.
-    out << "format: xcalib-rig\nversion: " << (rig.source_mirrored ? 2 : 1) << "\n";
+    out << "format: xcalib-rig\nversion: " << (rig.source_mirrored || rig.verdict ? 2 : 1) << "\n";
     write_camera(out, "reference", rig.reference);
     write_camera(out, "source", rig.source);
     out << "source_from_reference:\n"
@@ -194,6 +294,7 @@ void save_rig(const Rig& rig, const std::string& path) {
         out << "relative_depth:\n"
             << "  scale: " << text_of(rig.relative_depth->scale) << "\n"
             << "  shift: " << text_of(rig.relative_depth->shift) << "\n";
+    if (rig.verdict) write_verdict(out, *rig.verdict);
     const std::string beside = path + ".part" + std::to_string(::getpid());
     {
         std::ofstream file(beside, std::ios::binary);

@@ -12,6 +12,7 @@ from .._core import (
     CalibrationOptions,
     Pinhole,
     Rig,
+    Tolerance,
     _flow_arguments,
     left_out,
     report_document,
@@ -185,6 +186,14 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     help="Reference width that calibration works at [px].",
 )
 @click.option(
+    "--tolerance",
+    metavar="MEDIAN[,P95]",
+    default="2,5",
+    show_default=True,
+    help="Expected error up to which the rig is trusted, over the footage's own depths [px of the"
+    " reference at 640 px of width].",
+)
+@click.option(
     "--refine-plane",
     is_flag=True,
     help="With --depth plane: find the horizon and the roll from the footage (some 17 quick fits),"
@@ -218,6 +227,7 @@ def command(
     reference_hfov: float | None,
     optimize_reference: bool,
     working_width: int,
+    tolerance: str,
     refine_plane: bool,
     report_file: Path | None,
     quiet: bool,
@@ -256,6 +266,7 @@ def command(
     calibration.search.max_roll_deg = max_roll
     calibration.search.max_fov_ratio = max_fov_ratio
     calibration.mount = mount
+    calibration.tolerance = Tolerance.parse("--tolerance", tolerance)
     calibration.solver = solver
     calibration.validate()
     calibration.flow, flow = flow_of(flow_spec)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import errno
 import sys
+from pathlib import Path
 from typing import Any, NoReturn
 
 import click
+
+from .._core import Rig
 
 FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
 
@@ -16,6 +19,12 @@ def stop(code: int, message: str) -> NoReturn:
     label = "not to be trusted" if code == NOT_TRUSTED else "error"
     click.echo(f"{label}: {' '.join(message.split())}", err=True)
     sys.exit(code)
+
+
+def require_trusted(rig: Rig, file: Path) -> None:
+    """End the command where the rig's calibration was not to be trusted."""
+    if rig.verdict and not rig.verdict.trusted:
+        stop(NOT_TRUSTED, f"{file}: {rig.verdict.line()}")
 
 
 def warn(message: str) -> None:

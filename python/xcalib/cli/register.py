@@ -19,7 +19,7 @@ from .arguments import (
     rig_argument,
     threads_option,
 )
-from .errors import NOT_TRUSTED, stop
+from .errors import NOT_TRUSTED, require_trusted, stop
 
 
 @click.command("register", short_help="Bring SOURCE images onto the REFERENCE pixels.")
@@ -84,3 +84,4 @@ def command(
     click.echo(f"{total.summary()}: {output}")
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")
+    require_trusted(rig, rig_file)
