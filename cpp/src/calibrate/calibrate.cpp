@@ -159,16 +159,21 @@ double fit(Attempt& attempt, const ImageView& reference, const ImageView& source
         return start.merit;
     }
     const CalibrationResult empty = result;
-    const auto refine_half = [&](const WorkingImages& half, const Start& start) {
+    const auto refine_half = [&](const WorkingImages& half, Start& start) {
         CalibrationResult out = empty;
         refine(
             half, start, plan, [](const std::string&, double) {}, out);
-        return out.rig;
+        start.rig = out.rig;
+        start.levels = out.report.levels;
     };
     const Halves halves =
         fit_halves(*attempt.images, reference, source, attempt.initial, plan, refine_half,
                    [&](double share) { notify("search", 0.05 + 0.55 * share); });
     std::optional<Start> start = halves.start;
+    // The finest level reaches a pixel or so: from further off, the level before goes first.
+    constexpr double kNear = 1.0;
+    if (start && !(distance(halves, *attempt.images) < kNear))
+        while (start->levels.back().factor < 2) start->levels.pop_back();
     // Where they disagree, half of the frames may have been too few.
     if (!agree(halves, *attempt.images)) {
         Start whole =
@@ -256,6 +261,9 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     if (still > 0)
         result.report.message += format(
             "; what stands still in the reference (%.1f %% of its edges) is left out", 100 * still);
+    if (references[0].channels == 1 && sources[0].channels > 1)
+        result.report.message +=
+            "; the source is in colour and the reference is not: have they been exchanged?";
     notify("judge", 1.0);
     result.report.seconds = seconds_now() - start;
     result.report.time = images->times->seconds(resolve_threads(options.num_threads));

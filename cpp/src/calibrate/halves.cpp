@@ -36,8 +36,8 @@ Halves fit_halves(const WorkingImages& images, const ImageView& reference, const
         const auto notify = [&](double share) { progress(0.5 * (static_cast<double>(k) + share)); };
         try {
             Start start = find_start(half, reference, source, initial, plan, notify);
-            out.rigs[k] = refine(half, start);
-            start.rig = *out.rigs[k];
+            refine(half, start);
+            out.rigs[k] = start.rig;
             // The start of all frames is judged on all of them.
             const double here = merit_on(images, start.rig, plan);
             if (here <= best) continue;

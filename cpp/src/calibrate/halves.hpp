@@ -10,8 +10,8 @@
 
 namespace xcalib {
 
-// Refines a start on the given frames, as all frames are.
-using Refine = std::function<Rig(const WorkingImages&, const Start&)>;
+// Refines a start on the given frames, as all frames are: its rig and levels.
+using Refine = std::function<void(const WorkingImages&, Start&)>;
 
 struct Halves {
     std::array<std::optional<Rig>, 2> rigs;  // none where the search found nothing
