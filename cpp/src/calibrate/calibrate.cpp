@@ -258,7 +258,7 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
             }
         }
     }
-    if (still > 0)
+    if (still >= 0.001)
         result.report.message += format(
             "; what stands still in the reference (%.1f %% of its edges) is left out", 100 * still);
     if (references[0].channels == 1 && sources[0].channels > 1)
