@@ -23,6 +23,7 @@ BUILD_PACKAGES := ccache cmake g++ libceres-dev libeigen3-dev libhwy-dev libopen
 # What xcalib-cli needs besides.
 CLI_PACKAGES := libavcodec-dev libavformat-dev libavutil-dev libcli11-dev libswscale-dev pkg-config
 TEST_PACKAGES := clang-format libgtest-dev pkg-config
+FUZZ_PACKAGES := clang libclang-rt-14-dev
 BENCH_PACKAGES := libbenchmark-dev
 # The cross compiler's own libraries, and an emulator: no foreign architecture is added to dpkg.
 AARCH64_PACKAGES := cmake g++-aarch64-linux-gnu googletest libeigen3-dev libhwy-dev ninja-build pkg-config \
@@ -33,8 +34,8 @@ CPP_FILES = $(shell find bench/cpp cpp examples tests -name '*.[ch]' -o -name '*
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
     $(shell find cmake cpp python -type f -not -path '*/__pycache__/*')
 
-.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 sanitize packages format stub \
-    clean
+.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 test-native test-bad-inputs sanitize fuzz kill-test packages \
+    format stub clean
 help:
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
 
@@ -106,8 +107,32 @@ test-cpp: | test-packages bench-packages ## C++ tests, and the installed librari
 	$(call preset,release,-DXCALIB_BENCH=ON)
 	$(call preset,embedded)
 
-sanitize: | test-packages ## C++ tests under the address and undefined-behaviour sanitizers
+sanitize: | test-packages ## C++ tests under the sanitizers: addresses and undefined behaviour, then threads
 	$(call preset,sanitize)
+	$(call preset,threads)
+
+.PHONY: fuzz-packages
+fuzz-packages: | test-packages
+	@scripts/install_packages.sh $(FUZZ_PACKAGES)
+FUZZ_SECONDS ?= 60
+FUZZ_TARGETS := depth_stream journal npy rig_file times_table tiff_stack video
+# A unit that takes over 10 s or 2 GB has failed too.
+fuzz: $(VENV)/.installed $(VENV)/.test-requires | fuzz-packages ## every reader of files under libFuzzer, a minute each
+	cmake --preset fuzz -DXCALIB_WERROR=$(WERROR)
+	cmake --build --preset fuzz
+	PYTHONPATH=tests/bad_inputs $(BIN)/python tests/fuzz/write_corpora.py build/fuzz/seeds
+	for target in $(FUZZ_TARGETS); do \
+	    mkdir -p build/fuzz/corpus/$$target; \
+	    build/fuzz/tests/fuzz/fuzz_$$target -max_total_time=$(FUZZ_SECONDS) -timeout=10 -rss_limit_mb=2048 \
+	        -print_final_stats=1 -verbosity=0 -artifact_prefix=build/fuzz/ build/fuzz/corpus/$$target build/fuzz/seeds/$$target; \
+	done
+
+KILLS ?= 100
+kill-test: $(VENV)/.installed $(VENV)/.test-requires cli ## runs killed at random moments, and resumed
+	$(BIN)/python tests/kills.py --kills $(KILLS)
+
+test-native: | test-packages ## the registrar for this machine's instruction set alone, as some compile all they have
+	$(call preset,native)
 
 .PHONY: aarch64-packages
 aarch64-packages:
@@ -141,6 +166,9 @@ cli: | test-packages ## the command without Python, into build/release/cpp/cli
 # From the tests' folder: the package they import is the installed one.
 test-python: $(VENV)/.installed $(VENV)/.test-requires cli ## Python tests, on the installed package
 	cd tests && ../$(BIN)/python -m pytest -n auto --dist loadfile
+
+test-bad-inputs: $(VENV)/.installed $(VENV)/.test-requires cli ## each bad input on both commands
+	cd tests && XCALIB_ALL_ROWS=1 ../$(BIN)/python -m pytest -n auto bad_inputs
 
 # -- Figures --------------------------------------------------------------------------------------
 

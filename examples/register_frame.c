@@ -23,8 +23,10 @@ int main(void) {
     xcalib_rig rig;
     xcalib_options options = xcalib_default_options();
     xcalib_registrar* registrar = NULL;
-    const xcalib_camera reference = {WIDTH, HEIGHT, 300, 300, 159.5, 119.5, 0};
-    const xcalib_camera thermal = {SOURCE_WIDTH, SOURCE_HEIGHT, 150, 150, 79.5, 59.5, 0};
+    const xcalib_camera reference = {WIDTH, HEIGHT,           300, 300, 159.5, 119.5,
+                                     0,     XCALIB_LENS_NONE, {0}};
+    const xcalib_camera thermal = {
+        SOURCE_WIDTH, SOURCE_HEIGHT, 150, 150, 79.5, 59.5, 0, XCALIB_LENS_NONE, {0}};
     const xcalib_image source_image = {source, SOURCE_WIDTH, SOURCE_HEIGHT,
                                        1,      XCALIB_U16,   sizeof source[0]};
     const xcalib_image depth_image = {depth, WIDTH, HEIGHT, 1, XCALIB_F32, sizeof depth[0]};

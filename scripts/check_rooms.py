@@ -32,6 +32,7 @@ APART = {"depth", "judge", "footage"}
 HEADERS_ONLY = {
     "xcalib/error.hpp": "base",
     "xcalib/export.hpp": "base",
+    "xcalib/threads.hpp": "base",
     "xcalib/calibration_times.hpp": "objective",
     "xcalib.h": "register",
     "xcalib_rig_file.h": "rig_file",

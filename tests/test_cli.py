@@ -374,6 +374,11 @@ def test_an_unknown_depth_spec_says_what_is_accepted(scene: Path, refused: Refus
     [
         (("--reference-intrinsics", "1,2,3"), "'1,2,3' is not four numbers"),
         (("--source-intrinsics", "-1,2,3,4"), "FX and FY above 0"),
+        (
+            ("--source-lens", "brown:1,2"),
+            "--source-lens is 'brown:1,2', expected auto, none, brown:",
+        ),
+        (("--reference-lens", "fisheye:0,0,0,x"), "--reference-lens is 'fisheye:0,0,0,x'"),
         (("--frames", "0"), "--frames"),
         (("--seed", "-1"), "--seed"),
         (("--far", "0"), "plane far is 0"),

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from conftest import FRAMES, run
-from xcalib import Pinhole, Rig, metrics
+from xcalib import Lens, Pinhole, Rig, metrics
+from xcalib._core import parse_time_offset
 from xcalib.depth import FolderDepth, PlaneDepth, read_depth
 from xcalib.footage import (
     OffsetEstimate,
@@ -22,6 +23,7 @@ from xcalib.footage import (
     camera_infos,
     encoder,
     estimate_offset,
+    lens_of_topic,
     match_depths,
     offsets_around,
     open_matched_depth,
@@ -226,10 +228,11 @@ def write_parts(path: Path, frames: list[Image]) -> None:
         part = encoder.Encoder(parts[-1][0], path, frame, 10)
         part.write(frame)
         part.close(1)
-    encoder.join(parts, path, 10, lambda: None)
+    encoder.join(parts, path, path, 10, lambda: None)
 
 
-def test_a_video_is_whole_or_absent(tmp_path: Path) -> None:
+def test_a_video_has_all_its_frames_or_is_an_error(tmp_path: Path) -> None:
+    """What is not whole is for the sink to remove: it has no name of the output yet."""
     frames = moving(3, np.uint16)
     write_parts(tmp_path / "a.mkv", frames)
     assert {path.name for path in tmp_path.iterdir()} == {"0", "1", "2", "a.mkv"}
@@ -239,10 +242,9 @@ def test_a_video_is_whole_or_absent(tmp_path: Path) -> None:
     part.write(frames[0])
     with pytest.raises(OSError, match=r"b\.mkv: 1 of 2 frames could be written"):
         part.close(2)
-    part.discard()
+    part.end()
     with pytest.raises(OSError, match="coded otherwise"):
         write_parts(tmp_path / "c.mkv", [frames[0], moving(1)[0]])
-    assert {path.name for path in tmp_path.iterdir()} == {"0", "1", "2", "a.mkv"}
 
 
 def test_a_video_may_have_any_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -334,7 +336,10 @@ def test_bags(tmp_path: Path, kind: str) -> None:
     assert info.K[1, 1] == 301 and info.D[0] == 0.1
     result = run("inspect", bag)
     assert result.exit_code == 0, result.output
-    assert "FX,FY,CX,CY 300,301,160,120 px" in result.stdout
+    assert "FX,FY,CX,CY 300,301,160,120 px, lens brown:0.1,0,0,0,0" in result.stdout
+    lens = Lens("brown", [0.1, 0, 0, 0, 0])
+    assert info.lens == lens_of_topic(f"{bag}#/visible") == lens
+    assert lens_of_topic(f"{bag}#/thermal") is None and lens_of_topic(tmp_path) is None
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
@@ -379,7 +384,7 @@ def test_compressed_depth(tmp_path: Path) -> None:
     found = open_stream(f"{bag}#/m")[0]
     assert found.dtype == np.float32
     known = metres > 0.2  # codes end at 65535
-    np.testing.assert_allclose(found[known], metres[told], rtol=0.002)
+    np.testing.assert_allclose(found[known], metres[known], rtol=0.002)
     assert found[0, 0] == 0
     with pytest.raises(DecodeError, match=r"frame 0: cannot decode 28 bytes, .* rvl"):
         open_stream(f"{bag}#/rvl")[0]
@@ -892,6 +897,12 @@ def test_frames_that_cannot_be_decoded_do_not_hinder_the_offset() -> None:
     assert refine_offset(IDENTITY, visible, thermal, PlaneDepth(), candidates, 40).decided
 
 
+@pytest.mark.parametrize("text", ["auto", "0.25", "-2f", "0.0"])
+def test_an_offset_reads_as_it_is_written(text: str) -> None:
+    """The journal of `register` has it so."""
+    assert str(parse_time_offset(text)) == text
+
+
 def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> None:
     visible, thermal = rendered / "visible", rendered / "thermal"
     rest = ("--depth", rendered / "depth", "-o", tmp_path / "o")
@@ -899,7 +910,7 @@ def test_refused_footage(rendered: Path, tmp_path: Path, refused: Refused) -> No
     for arguments, named in (
         ((visible, thermal, "--time-offset", "soon"), "'soon' is neither `auto` nor a number"),
         ((visible, thermal, "--time-offset", "1"), "needs frames paired by time; they are by name"),
-        ((visible, thermal, "--time-offset", "auto"), "needs times of both streams"),
+        ((visible, thermal, "--time-offset", "auto", "--pair", "time"), "needs times of both"),
         ((visible, thermal, "--pair", "time"), "reference frames have no times"),
         ((visible, tmp_path / "no.mp4"), "no.mp4: no such file"),
         ((visible, f"{thermal}#down"), "thermal#down: expected #TOPIC"),

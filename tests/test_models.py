@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from conftest import run
+from xcalib import models
 from xcalib.depth.recipes import RECIPES
 from xcalib.frames import InputError
 from xcalib.models import fetch, read_index, verify
@@ -28,6 +29,10 @@ class Server(http.server.ThreadingHTTPServer):
         self.break_after: int | None = None
         """Bytes after which a transfer is cut off."""
         self.tags = True
+        self.length = True
+        self.whole = False
+        """Answer a range with the whole file, as if it were the range."""
+        self.redirect = ""
         self.asked: list[str | None] = []
         """The ranges that were asked for."""
 
@@ -51,6 +56,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if "missing" in self.path:
             self.send_error(404)
             return
+        if server.redirect:
+            self.send_response(302)
+            self.send_header("Location", server.redirect)
+            self.end_headers()
+            return
         tag = f'"{hashlib.sha256(data).hexdigest()[:8]}"'
         start = 0
         if wanted and self.headers.get("If-Range") == tag:
@@ -59,7 +69,12 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.send_error(416)
             return
         self.send_response(206 if start else 200)
-        self.send_header("Content-Length", str(len(data) - start))
+        if server.whole:
+            start = 0
+        elif start:
+            self.send_header("Content-Range", f"bytes {start}-{len(data) - 1}/{len(data)}")
+        if server.length:
+            self.send_header("Content-Length", str(len(data) - start))
         if server.tags:
             self.send_header("ETag", tag)
         self.end_headers()
@@ -121,6 +136,57 @@ def test_file_that_changed_meanwhile_is_not_patched_together(server: Server, fol
     server.break_after, server.data = None, DATA[::-1]
     assert fetch(server.url).read_bytes() == DATA[::-1]
     assert server.asked == [None, "bytes=300000-"]
+
+
+def test_a_whole_file_in_place_of_the_rest_is_not_appended(server: Server, folder: Path) -> None:
+    server.break_after = 300_000
+    with pytest.raises(RuntimeError, match="fetch again to resume"):
+        fetch(server.url)
+    server.break_after, server.whole = None, True
+    with pytest.raises(RuntimeError, match="cannot be resumed, fetch it again"):
+        fetch(server.url)
+    assert read_index(folder) == {}
+    assert fetch(server.url).read_bytes() == DATA
+
+
+@pytest.mark.parametrize("length", [True, False])
+def test_what_is_no_model_by_its_size_is_refused(
+    server: Server, folder: Path, monkeypatch: pytest.MonkeyPatch, length: bool
+) -> None:
+    server.length = length
+    monkeypatch.setattr(models, "LARGEST", 1_000_000)
+    with pytest.raises(InputError, match="bytes, expected"):
+        fetch(server.url)
+    server.data = b""
+    with pytest.raises(RuntimeError, match="the server sent an empty file"):
+        fetch(server.url, name="empty.onnx")
+    assert read_index(folder) == {}
+    assert not list(folder.glob("*.onnx"))
+
+
+@pytest.mark.parametrize("address", ["ftp://127.0.0.1/net.onnx", "file:///etc/hostname"])
+def test_a_server_leads_to_no_other_scheme(server: Server, folder: Path, address: str) -> None:
+    server.redirect = address
+    with pytest.raises(RuntimeError, match=r"another scheme|not allowed"):
+        fetch(server.url)
+    assert read_index(folder) == {}
+
+
+def test_passwords_are_neither_printed_nor_kept(server: Server, folder: Path) -> None:
+    result = run("models", "fetch", server.url.replace("http://", "http://me:secret@"))
+    assert result.exit_code == 2
+    assert "secret" not in result.output and "expected one without" in result.stderr
+    assert not folder.exists()
+
+
+def test_a_planted_link_is_not_followed(server: Server, folder: Path, tmp_path: Path) -> None:
+    folder.mkdir()
+    mine = tmp_path / "mine"
+    mine.write_text("mine")
+    (folder / ".net.onnx.partial").symlink_to(mine)
+    with pytest.raises(OSError, match="symbolic links"):
+        fetch(server.url)
+    assert mine.read_text() == "mine"
 
 
 def test_another_file_at_the_old_address_is_refused(server: Server, folder: Path) -> None:

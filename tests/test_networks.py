@@ -469,6 +469,34 @@ def test_damaged_results_are_computed_again(
     assert not list(cache.rglob("*.partial"))
 
 
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"values": np.ones(3, np.float32), "camera": np.ones(2)},
+        {"values": np.ones((3, 4)), "camera": np.ones(2)},
+        {"values": np.ones((3, 4), np.float32), "camera": np.ones(3)},
+        {"values": np.ones((0, 4), np.float32), "camera": np.ones(2)},
+        {"values": np.ones((3, 4), np.float32), "camera": np.array(["a", "b"])},
+        {"values": np.ones((3, 4), np.float32)},
+        {},
+    ],
+)
+def test_results_of_another_shape_are_computed_again(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    cache: Path,
+    calls: list[tuple[int, ...]],
+    arrays: dict[str, np.ndarray],
+) -> None:
+    provider = depth_of(channel(tmp_path / "m.onnx"), PLAIN, monkeypatch)
+    image = images(1)[0]
+    depth = provider(0, image)
+    (entry,) = cache.rglob("*.npz")
+    np.savez(entry, allow_pickle=False, **arrays)
+    np.testing.assert_array_equal(provider(0, image), depth)
+    assert len(calls) == 2
+
+
 def test_cache_that_cannot_be_written_does_not_stop_a_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

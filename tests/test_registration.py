@@ -300,7 +300,7 @@ class Tired:
     ],
     ids=lambda error: type(error).__name__,
 )
-@pytest.mark.parametrize("place", ["read", "depth", "write_image"])
+@pytest.mark.parametrize("place", ["read", "depth", "encode_image"])
 def test_what_python_raises_is_carried_through_the_core(
     drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, error: BaseException
 ) -> None:
@@ -311,7 +311,7 @@ def test_what_python_raises_is_carried_through_the_core(
     owner, name = {
         "read": (ImageFiles, "read"),
         "depth": (FolderDepth, "__call__"),
-        "write_image": (encoder, "write_image"),
+        "encode_image": (encoder, "encode_image"),
     }[place]
     tired = Tired(getattr(owner, name), 50, error)
     with monkeypatch.context() as patched:

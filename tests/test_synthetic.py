@@ -168,7 +168,7 @@ def test_occluded_means_something_nearer_is_in_the_way() -> None:
     x, y = (np.rint(np.nan_to_num(target[..., axis], nan=-99)).astype(int) for axis in (0, 1))
     inside = (x >= 1) & (y >= 1) & (x < 335) & (y < 263) & (depth > 0)
     assert not hidden[depth == 0].any()
-    # At a silhouette the pixel grid does not decide; where a neighbourhood agrees, so must the rays.
+    # At a silhouette the grid does not decide; where a neighbourhood agrees, so must the rays.
     far_away = np.where(seen > 0, seen, 1e6)
     least, most = (f(far_away, np.ones((3, 3))) for f in (cv2.erode, cv2.dilate))
     z, least, most = target[..., 2][inside], least[y[inside], x[inside]], most[y[inside], x[inside]]

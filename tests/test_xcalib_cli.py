@@ -62,6 +62,15 @@ def assert_same_pixels(first: Path, second: Path, count: int = FRAMES) -> None:
         ("--solver", "adam", "--frames", 2),
         ("--source-intrinsics", "277,278,105,85.5", "--optimize-reference"),
         ("--depth-steady", "--choose", "spread"),
+        (
+            *(
+                "--reference-intrinsics",
+                "343,343,160,120",
+                "--reference-lens",
+                "fisheye:0.01,0,0,0",
+            ),
+            *("--source-lens", "brown:-0.05,0.01,0,0,0.001"),
+        ),
     ],
 )
 def test_calibrate_writes_the_same_rig(
@@ -330,7 +339,8 @@ def test_bench_times_frames(cli: Callable[..., Process], rendered: Path) -> None
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--refine-plane"),
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--initial", "no.yaml"),
         ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "1"),
-        ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "auto"),
+        ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "1s"),
+        ("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r", "--time-offset", "9f"),
         (
             "register",
             "rig.yaml",
@@ -343,7 +353,7 @@ def test_bench_times_frames(cli: Callable[..., Process], rendered: Path) -> None
             "--time-offset",
             "auto",
             "--pair",
-            "name",
+            "time",
         ),
         (
             "calibrate",
@@ -367,6 +377,10 @@ def test_bench_times_frames(cli: Callable[..., Process], rendered: Path) -> None
         (
             *("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r"),
             *("--source-colormap", "mud"),
+        ),
+        (
+            *("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r"),
+            *("--source-lens", "brown:1,2,3"),
         ),
         ("register", "rig.yaml", "visible", "thermal", "--depth", "depth", "-o", "visible"),
         ("register", "other.yaml", "visible", "thermal", "--depth", "depth", "-o", "OUT"),

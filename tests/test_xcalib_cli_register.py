@@ -259,7 +259,7 @@ def test_16_bits_in_a_video(cli: Callable[..., Process], scene: Path, tmp_path: 
     images = open_stream(tmp_path / "out.mkv")
     assert images[0].dtype == np.uint16 and images[0].max() > 255
     same_frames(tmp_path / "out.mkv", tmp_path / "out")
-    refused = cli(*given, tmp_path / "out.mp4")
+    refused = cli(*given, tmp_path / "other.mp4")
     assert refused.returncode == 2 and ".mp4 holds uint8, a folder holds any" in refused.stderr
 
 
@@ -300,7 +300,7 @@ def test_changed_missing_and_damaged_files_are_made_again(
     names = [path.name for path in list_files(out)]
     (out / names[3]).unlink()
     (out / "masks" / names[4]).write_bytes(b"")
-    (out / "masks" / f".{names[5]}.77.partial").write_bytes(b"half")
+    (out / "masks" / f".{names[5]}.0123456789abcdef.partial").write_bytes(b"half")
     journal.write_text(journal.read_text() + '{"frames": {"12')  # as a power cut leaves it
     result = cli(*arguments(scene, out))
     assert f"({FRAMES - 2} from before)" in result.stdout
@@ -447,6 +447,35 @@ def test_live_frames_do_not_mix_with_others(
     assert cli(*given[:-1], video).returncode == 0
     assert len(open_stream(video)) == 3
     assert {path.name for path in tmp_path.iterdir()} == {"out", "live.mkv", "live.masks.mkv"}
+
+
+def test_a_killed_live_video_is_made_of_its_parts(
+    binary: Path, cli: Callable[..., Process], film: tuple[Path, ...], tmp_path: Path
+) -> None:
+    out = tmp_path / "out.mkv"
+    given = ("register", *film, "--depth", "plane", "--live", "-o", out)
+    some = lambda: bool(whole_lines(journal_of(out)))  # noqa: E731
+    code, _ = interrupted((binary, *given), some, signal.SIGKILL, 0)
+    assert code == -signal.SIGKILL and not out.exists()
+    noted = [len(json.loads(line)["frames"]) for line in whole_lines(journal_of(out))]
+    assert noted and set(noted) == {250}
+    again = cli(*given)
+    assert again.returncode == 2 and "`xcalib-cli join` makes a video of what" in again.stderr
+    joined = cli("join", out)
+    assert joined.returncode == 0, joined.stderr
+    assert joined.stdout == f"{sum(noted)} frames: {out}\n"
+    assert cli("register", *film, "--depth", "plane", "-o", tmp_path / "whole.mkv").returncode == 0
+    for name in ("out.mkv", "out.masks.mkv"):
+        made = open_stream(tmp_path / name)
+        whole = open_stream(tmp_path / name.replace("out", "whole"))
+        assert len(made) == sum(noted)
+        for index in (0, 249):
+            gray = cv2.extractChannel(made[index], 0)  # a live file is read as colour
+            np.testing.assert_array_equal(gray, whole[index])
+    assert not (tmp_path / "out.mkv.parts").exists()
+    assert "is joined already" in cli("join", out).stderr
+    refused = cli("join", tmp_path / "whole.mkv")
+    assert refused.returncode == 2 and "expected those of a live run" in refused.stderr
 
 
 # -- The offset of two clocks

@@ -36,6 +36,19 @@ def depths() -> list[np.ndarray]:
     return out
 
 
+def through(rig: xcalib.Rig, both: bool) -> xcalib.Rig:
+    """The rig with a lens on the source, as strong as thermal ones are, or on both."""
+    lenses = (
+        xcalib.Lens("brown", [-0.1, 0.02, 0, 0]) if both else xcalib.Lens(),
+        xcalib.Lens("brown", [-0.3, 0.1, 0.001, -0.001, 0.01]),
+    )
+    cameras = (
+        xcalib.Pinhole(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.skew, lens)
+        for c, lens in zip((rig.reference, rig.source), lenses, strict=True)
+    )
+    return xcalib.Rig(*cameras, rig.R, rig.t)
+
+
 def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object]]:
     """Name and call; a call takes the depth and which of the four it is."""
     rng = np.random.default_rng(0)
@@ -45,7 +58,9 @@ def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object
     wide = (65535 * source).astype(np.uint16)
     mask = np.empty((HEIGHT, WIDTH), np.uint8)
 
-    def ours(image: np.ndarray, **options: object) -> Callable[[np.ndarray, int], object]:
+    def ours(
+        image: np.ndarray, rig: xcalib.Rig = rig, **options: object
+    ) -> Callable[[np.ndarray, int], object]:
         registrar = xcalib.Registrar(rig, **{"num_threads": 1, "occlusion": "ignore", **options})
         out = np.empty((HEIGHT, WIDTH, *image.shape[2:]), image.dtype)
         return lambda depth, _: registrar.register(image, depth, out=out, mask=mask)
@@ -69,6 +84,10 @@ def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object
         "float32, two threads": ours(source, num_threads=2),
         "float32, occlusion, two threads": ours(source, occlusion="mark", num_threads=2),
         "float32, uint16 depth": lambda _, i: kitti(units[i], i),
+        "float32, source lens": ours(source, through(rig, False)),
+        "float32, both lenses": ours(source, through(rig, True)),
+        "float32, source lens, occlusion": ours(source, through(rig, False), occlusion="mark"),
+        "float32, both lenses, occlusion": ours(source, through(rig, True), occlusion="mark"),
         "uint8": ours(counts),
         "uint16": ours(wide),
         "uint8, colour": ours(colour),
@@ -115,6 +134,20 @@ def main() -> None:
     ratio("ours takes, times cv2.remap with the map ready", "float32", "cv2.remap, map ready")
     ratio("ours takes, times a copy", "float32", "copy")
     ratio("ours with occlusion takes, times a copy", "float32, occlusion", "copy")
+    ratio("with a lens on the source, times without", "float32, source lens", "float32", "<= 1.2")
+    ratio("with lenses on both, times without", "float32, both lenses", "float32", "<= 1.4")
+    ratio(
+        "with a lens on the source, times without, with occlusion",
+        "float32, source lens, occlusion",
+        "float32, occlusion",
+        "<= 1.2",
+    )
+    ratio(
+        "with lenses on both, times without, with occlusion",
+        "float32, both lenses, occlusion",
+        "float32, occlusion",
+        "<= 1.4",
+    )
     ratio("float32 takes, times uint8", "float32", "uint8")
     ratio("one thread takes, times two", "float32", "float32, two threads")
     ratio(

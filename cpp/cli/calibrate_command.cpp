@@ -15,6 +15,8 @@
 #include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
 #include "xcalib/stream/files.hpp"
+#include "xcalib/stream/neighbours.hpp"
+#include "xcalib/stream/outputs.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -22,7 +24,8 @@ namespace {
 struct Arguments {
     FrameArguments frames;
     std::string output, choose = "informed", colormap = "auto", initial, search = "auto",
-                        mount = "auto", flow = "auto", solver = "ceres", tolerance = "2,5", report;
+                        mount = "auto", flow = "auto", solver = "ceres", tolerance = "2,5", report,
+                        reference_lens = "auto", source_lens = "auto";
     std::optional<std::string> reference_intrinsics, source_intrinsics;
     bool explain = false, refine_plane = false;
     CalibrationOptions options;
@@ -123,6 +126,34 @@ CalibrationResult calibrated(const Frames& frames, const LoadedFrames& loaded,
     }
 }
 
+// Fits at the lags around, for footage that is a sequence. A lag that fits better is taken up where
+// it is to be found (`--time-offset auto`): `frames`, `loaded` and `result` are then those of it.
+// Otherwise the result is not to be trusted.
+void look_at_lags(Frames& frames, LoadedFrames& loaded, const CalibrationOptions& options,
+                  const std::optional<Rig>& initial, Console& console, CalibrationResult& result) {
+    constexpr int kLagRounds = 2;  // times at most that a lag is taken up
+    for (int round = 0;; ++round) {
+        FittedFrames fitted{loaded.views(&Frame::reference),
+                            loaded.views(&Frame::source),
+                            loaded.views(&Frame::depth),
+                            {}};
+        for (const int index : loaded.indices)
+            fitted.partners.push_back(frames.partners[static_cast<std::size_t>(index)]);
+        const LagReport lag =
+            fit_lags(fitted, *frames.all_sources, result.rig, options,
+                     [&](double share) { console.progress("lags", 0.9 * share); });
+        if (lag.frames == 0 || !frames.offset.automatic || round == kLagRounds) {
+            add_lags(lag, frames.offset, *frames.all_sources, result);
+            return;
+        }
+        console.note("clock offset: " + lag.line() + ", taken up");
+        std::vector<int> chosen = loaded.indices;
+        frames = with_lag(frames, lag.frames, chosen);
+        loaded = load(frames, chosen, console);
+        result = calibrated(frames, loaded, options, initial, console);
+    }
+}
+
 void check(const Arguments& a) {
     if (a.reference_intrinsics && (a.options.reference_hfov_deg || a.options.optimize_reference))
         throw InputError(
@@ -145,12 +176,14 @@ void check(const Arguments& a) {
     value_of("--flow", a.flow, flow_arguments());
 }
 
-void run(Arguments a, Console& console) {
+void run(Arguments a, bool has_report, Console& console) {
     check(a);
     CalibrationOptions& options = a.options;
     options.search.mode = value_of<SearchMode>("--search", a.search);
     options.mount = Mount::parse("--mount", a.mount);
     options.tolerance = Tolerance::parse("--tolerance", a.tolerance);
+    options.reference_lens = Lens::parse("--reference-lens", a.reference_lens);
+    options.source_lens = Lens::parse("--source-lens", a.source_lens);
     options.flow = value_of("--flow", a.flow, flow_arguments());
     options.solver = value_of<Solver>("--solver", a.solver);
     std::optional<Pinhole> reference_camera, source_camera;
@@ -161,10 +194,11 @@ void run(Arguments a, Console& console) {
     options.validate();
 
     std::optional<Rig> initial;
-    if (!a.initial.empty()) initial = load_rig(a.initial);
+    if (!a.initial.empty()) initial = load_rig(a.initial, console);
     Frames frames = open_frames(a.frames, initial, console);
-    check_file_writable(a.output);
-    if (!a.report.empty()) check_file_writable(a.report);
+    std::vector<Path> writes = {a.output};
+    if (has_report) writes.emplace_back(a.report);
+    check_writes(writes, frames, {a.initial, a.frames.reference_times, a.frames.source_times});
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
 
     const std::vector<int> chosen =
@@ -195,12 +229,14 @@ void run(Arguments a, Console& console) {
         const DepthPointer depth = plane_depth(plane);
         for (std::size_t i = 0; i < loaded.frames.size(); ++i)
             loaded.frames[i].depth = (*depth)(loaded.indices[i], loaded.frames[i].reference);
+        frames.depth = depth;
         result = calibrated(frames, loaded, options, result.rig, console);
         std::ostringstream text;
         text << "plane: --horizon " << plane.horizon << " --plane-roll " << plane.roll_deg;
         console.line(text.str());
         console.event("plane", {{"horizon", plane.horizon}, {"plane_roll", plane.roll_deg}});
     }
+    look_at_lags(frames, loaded, options, initial, console, result);
     const Path output(a.output);
     if (output.has_parent_path()) std::filesystem::create_directories(output.parent_path());
     save_rig(result.rig, a.output);
@@ -209,12 +245,24 @@ void run(Arguments a, Console& console) {
     std::vector<std::string> files;
     for (const int index : loaded.indices) files.push_back(frames.references->where(index));
     const std::string document = report_document(result.report, a.output, files);
-    if (!a.report.empty()) {
+    if (has_report) {
         write_file(a.report, document);
         console.line("report: " + a.report);
     }
     console.result(Json::parse(document));
     if (!result.converged) throw NotTrusted(result.report.message);
+}
+
+void add_lens(CLI::App& command, const std::string& camera, std::string& word) {
+    command
+        .add_option("--" + camera + "-lens", word,
+                    "Known lens of the " + camera +
+                        " camera, OpenCV's model and coefficients, kept; auto: that of the initial"
+                        " rig, with --" +
+                        camera + "-intrinsics none; else " +
+                        (camera == "source" ? "k1 and k2 are estimated." : "none."))
+        ->type_name("auto|none|brown:K1,K2,P1,P2[,K3[,K4,K5,K6]]|fisheye:K1,K2,K3,K4")
+        ->capture_default_str();
 }
 
 }  // namespace
@@ -249,7 +297,8 @@ void add_calibrate(CLI::App& app, Console& console) {
     add_threads(*command, a.options.num_threads);
     command
         ->add_option("--initial", a.initial, "Rig file to start from.  [default: none, searched]")
-        ->type_name("RIG");
+        ->type_name("RIG")
+        ->check(kNamed);
     command
         ->add_option("--search", a.search,
                      "Global search before refinement: full, local (around the initial rig), off,"
@@ -295,6 +344,8 @@ void add_calibrate(CLI::App& app, Console& console) {
                      "Known intrinsics of the source camera, kept [px].  [default: none,"
                      " estimated]")
         ->type_name("FX,FY,CX,CY");
+    add_lens(*command, "reference", a.reference_lens);
+    add_lens(*command, "source", a.source_lens);
     command
         ->add_option("--reference-hfov", a.options.reference_hfov_deg,
                      "Horizontal field of view of the reference camera at the start [deg]."
@@ -317,11 +368,13 @@ void add_calibrate(CLI::App& app, Console& console) {
     command->add_flag("--refine-plane", a.refine_plane,
                       "With --depth plane: find the horizon and the roll from the footage (some 17"
                       " quick fits), and print them for `register`.");
-    command->add_option("--report", a.report, "Also write the full report (JSON).")
-        ->type_name("FILE");
+    CLI::Option* report =
+        command->add_option("--report", a.report, "Also write the full report (JSON).")
+            ->type_name("FILE");
     command->add_flag("--quiet", console.quiet, "No progress.");
     command->fallthrough();
-    command->callback([arguments, &console] { run(*arguments, console); });
+    command->callback(
+        [arguments, report, &console] { run(*arguments, !report->empty(), console); });
 }
 
 }  // namespace xcalib::cli

@@ -13,6 +13,7 @@ void add_calibrate(CLI::App& app, Console& console);
 void add_register(CLI::App& app, Console& console);
 void add_evaluate(CLI::App& app, Console& console);
 void add_inspect(CLI::App& app, Console& console);
+void add_join(CLI::App& app, Console& console);
 void add_bench(CLI::App& app, Console& console);
 
 }  // namespace xcalib::cli

@@ -2,11 +2,11 @@
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <system_error>
 
 #include "xcalib/stream/interrupts.hpp"
 
@@ -22,6 +22,16 @@ std::string one_line(const std::string& text) {
     return line;
 }
 
+// std::cerr is left to libraries, and leads nowhere: main(). What cannot be said there is not said.
+void put_on_stderr(const std::string& text) {
+    for (std::size_t done = 0; done < text.size();) {
+        const ssize_t written = write(STDERR_FILENO, text.data() + done, text.size() - done);
+        if (written < 0 && errno == EINTR) continue;
+        if (written <= 0) return;
+        done += static_cast<std::size_t>(written);
+    }
+}
+
 }  // namespace
 
 void require_trusted(const Rig& rig, const std::string& file) {
@@ -31,13 +41,19 @@ void require_trusted(const Rig& rig, const std::string& file) {
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 void Console::clear_bar() {
-    if (bar_) std::cerr << "\r\033[K" << std::flush;
+    if (bar_) put_on_stderr("\r\033[K");
     bar_ = false;
 }
 
 void Console::put(const std::string& text) {
-    std::cout << text << "\n" << std::flush;
-    if (!std::cout) throw std::runtime_error("cannot write to stdout");
+    const std::string line = text + "\n";
+    for (std::size_t done = 0; done < line.size();) {
+        const ssize_t written = write(STDOUT_FILENO, line.data() + done, line.size() - done);
+        if (written < 0 && errno == EINTR) continue;
+        if (written < 0 && errno == EPIPE) throw ClosedPipe();
+        if (written <= 0) throw std::system_error(errno, std::generic_category(), "stdout");
+        done += static_cast<std::size_t>(written);
+    }
 }
 
 void Console::line(const std::string& text) {
@@ -59,7 +75,7 @@ void Console::event(const std::string& name, Json fields) {
 void Console::print(const std::string& label, const std::string& text) {
     const std::lock_guard lock(mutex_);
     clear_bar();
-    std::cerr << label << one_line(text) << std::endl;
+    put_on_stderr(label + one_line(text) + "\n");
 }
 
 void Console::note(const std::string& text) {
@@ -72,9 +88,13 @@ void Console::warn(const std::string& text) {
     event("warning", {{"message", one_line(text)}});
 }
 
-void Console::error(int code, const std::string& text) {
-    print(code == kNotTrusted ? "not to be trusted: " : "error: ", text);
-    event("end", {{"exit_code", code}, {"message", one_line(text)}});
+void Console::error(int code, const std::string& text) noexcept {
+    try {
+        print(code == kNotTrusted ? "not to be trusted: " : "error: ", text);
+        event("end", {{"exit_code", code}, {"message", one_line(text)}});
+    } catch (const std::exception&) {
+        // The first of two errors is shown; this one may be that nothing can be.
+    }
 }
 
 void Console::progress(const std::string& stage, double fraction) {
@@ -91,16 +111,15 @@ void Console::show(const std::string& stage, double fraction, const std::string&
         const auto now = std::chrono::steady_clock::now();
         if (!json && !terminal && !detail.empty() && now - said_ > kBetweenLines) {
             said_ = now;
-            std::cerr << stage << ": " << detail << std::endl;
+            put_on_stderr(stage + ": " + detail + "\n");
         }
         if (percent == percent_ && stage == stage_) return;
         percent_ = percent;
         stage_ = stage;
         if (!json && terminal) {
-            std::fprintf(stderr, "\r\033[K%s %3d%% %s", stage.c_str(), percent, detail.c_str());
-            bar_ = fraction < 1;
-            if (!bar_) std::fputs("\r\033[K", stderr);
-            std::fflush(stderr);
+            put_on_stderr("\r\033[K" + stage + " " + std::to_string(percent) + "% " + detail);
+            bar_ = true;
+            if (fraction >= 1) clear_bar();
         }
     }
     event("progress", {{"stage", stage}, {"fraction", fraction}});

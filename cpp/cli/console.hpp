@@ -27,6 +27,12 @@ class NotTrusted : public std::runtime_error {
 // The same, for a rig whose calibration was not.
 void require_trusted(const Rig& rig, const std::string& file);
 
+// Whoever read our output has gone: nothing is to be said any more.
+class ClosedPipe : public std::runtime_error {
+   public:
+    ClosedPipe() : std::runtime_error("nobody reads stdout") {}
+};
+
 class Console {
    public:
     bool json = false;
@@ -37,7 +43,7 @@ class Console {
     void event(const std::string& name, Json fields);
     void note(const std::string& text);
     void warn(const std::string& text);
-    void error(int code, const std::string& text);
+    void error(int code, const std::string& text) noexcept;
     // `fraction` of `stage`, (0, 1]. `detail`: more of it, for people; where there is no terminal,
     // a line now and then.
     void show(const std::string& stage, double fraction, const std::string& detail = "");

@@ -5,9 +5,9 @@
 
 #include "files.hpp"
 #include "footage.hpp"
-#include "npy.hpp"
 #include "xcalib/depth/complete_depth.hpp"
 #include "xcalib/depth/steady_depth.hpp"
+#include "xcalib/stream/npy.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -124,7 +124,7 @@ cv::Mat read_depth(const Path& file, double scale) {
     const std::string suffix = lower_suffix(file);
     cv::Mat depth;
     if (suffix == ".npy") {
-        depth = read_npy(file);
+        depth = mat_of(read_npy(file).view).clone();
     } else {
         const cv::Mat values = decode(file);
         if (values.channels() != 1)

@@ -188,15 +188,9 @@ void check_count(const Path& file, int frames, const Path& target) {
                                  " frames could be written; is there space on the disk?");
 }
 
-void remove_quietly(const Path& file) {
-    std::error_code ignored;
-    fs::remove(file, ignored);
-}
-
 class Encoder : public PartWriter {
    public:
-    Encoder(Path path, Path target, const ImageView& first, double rate);
-    ~Encoder() override;
+    Encoder(Path file, Path target, const ImageView& first, double rate);
     void write(const Picture& image) override;
     void close(int frames) override;
 
@@ -204,7 +198,7 @@ class Encoder : public PartWriter {
     struct State;
     void mux(const ImageView* image);  // none: what is still to come
 
-    Path path_, target_, partial_;
+    Path file_, target_;
     std::unique_ptr<State> state_;
 };
 
@@ -217,8 +211,8 @@ struct Encoder::State {
     std::int64_t written = 0, muxed = 0;
 };
 
-Encoder::Encoder(Path path, Path target, const ImageView& first, double rate)
-    : path_(std::move(path)), target_(std::move(target)), partial_(path_.string() + ".partial") {
+Encoder::Encoder(Path file, Path target, const ImageView& first, double rate)
+    : file_(std::move(file)), target_(std::move(target)) {
     av_log_set_level(AV_LOG_QUIET);
     const Kind& kind = kind_of(target_);
     const AVCodec* encoder = avcodec_find_encoder_by_name(kind.codec);
@@ -226,7 +220,7 @@ Encoder::Encoder(Path path, Path target, const ImageView& first, double rate)
         throw InputError(target_.string() + ": this FFmpeg cannot write " + kind.codec +
                          " video, expected another suffix, or a folder");
     try {
-        state_.reset(new State{{partial_, "matroska", target_},
+        state_.reset(new State{{file_, "matroska", target_},
                                Codec(avcodec_alloc_context3(encoder)),
                                RawFrame(av_frame_alloc()),
                                RawFrame(av_frame_alloc()),
@@ -264,15 +258,8 @@ Encoder::Encoder(Path path, Path target, const ImageView& first, double rate)
         if (!s.scaler) throw std::bad_alloc();
     } catch (...) {
         state_.reset();
-        remove_quietly(partial_);
         throw;
     }
-}
-
-Encoder::~Encoder() {
-    if (!state_) return;
-    state_.reset();
-    remove_quietly(partial_);
 }
 
 void Encoder::mux(const ImageView* image) {
@@ -300,15 +287,14 @@ void Encoder::write(const Picture& image) { mux(&image.view); }
 void Encoder::close(int frames) {
     mux(nullptr);
     state_->output.end();
-    check_count(partial_, frames, target_);
-    fs::rename(partial_, path_);
+    check_count(file_, frames, target_);
     state_.reset();
 }
 
 }  // namespace
 
-void FfmpegCodecs::write_image(const Path& file, const Picture& image) {
-    cli::write_image(file, image.view);
+std::string FfmpegCodecs::encode_image(const Path& file, const Picture& image) {
+    return cli::encode_image(file, image.view);
 }
 
 std::string FfmpegCodecs::encoder_name() {
@@ -317,47 +303,39 @@ std::string FfmpegCodecs::encoder_name() {
            std::to_string(version >> 8 & 255) + "." + std::to_string(version & 255);
 }
 
-std::unique_ptr<PartWriter> FfmpegCodecs::open_part(const Path& part, const Path& target,
+std::unique_ptr<PartWriter> FfmpegCodecs::open_part(const Path& file, const Path& target,
                                                     const Picture& first, double rate) {
-    return std::make_unique<Encoder>(part, target, first.view, rate);
+    return std::make_unique<Encoder>(file, target, first.view, rate);
 }
 
-void FfmpegCodecs::join(const std::vector<std::pair<Path, int>>& parts, const Path& target,
-                        double rate, const std::function<void()>& check) {
-    Path partial = parts[0].first;
-    partial.replace_filename(target.filename().string() + ".partial");
+void FfmpegCodecs::join(const std::vector<std::pair<Path, int>>& parts, const Path& file,
+                        const Path& target, double rate, const std::function<void()>& check) {
     int wanted = 0;
-    try {
-        {
-            Output output(partial, kind_of(target).container, target);
-            AVStream* stream = output.add(rational(rate));
-            const Packet packet(av_packet_alloc());
-            std::int64_t frames = 0;
-            for (const auto& [file, count] : parts) {
-                Input part(file, target);
-                const AVCodecParameters& codec = part.codec();
-                if (wanted == 0) {
-                    checked(avcodec_parameters_copy(stream->codecpar, &codec), target);
-                    stream->codecpar->codec_tag = 0;
-                    output.begin();
-                } else if (header_of(codec) != header_of(*stream->codecpar)) {
-                    throw InputError(file.string() + ": coded otherwise than " +
-                                     parts[0].first.string());
-                }
-                for (int i = 0; i < count && part.next(packet.get()); ++i) {
-                    check();
-                    output.put(packet.get(), frames++);
-                }
-                wanted += count;
+    {
+        Output output(file, kind_of(target).container, target);
+        AVStream* stream = output.add(rational(rate));
+        const Packet packet(av_packet_alloc());
+        std::int64_t frames = 0;
+        for (const auto& [path, count] : parts) {
+            Input part(path, target);
+            const AVCodecParameters& codec = part.codec();
+            if (wanted == 0) {
+                checked(avcodec_parameters_copy(stream->codecpar, &codec), target);
+                stream->codecpar->codec_tag = 0;
+                output.begin();
+            } else if (header_of(codec) != header_of(*stream->codecpar)) {
+                throw InputError(path.string() + ": coded otherwise than " +
+                                 parts[0].first.string());
             }
-            output.end();
+            for (int i = 0; i < count && part.next(packet.get()); ++i) {
+                check();
+                output.put(packet.get(), frames++);
+            }
+            wanted += count;
         }
-        check_count(partial, wanted, target);
-        fs::rename(partial, target);
-    } catch (...) {
-        remove_quietly(partial);
-        throw;
+        output.end();
     }
+    check_count(file, wanted, target);
 }
 
 }  // namespace xcalib::cli

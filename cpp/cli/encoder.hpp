@@ -11,13 +11,13 @@ namespace xcalib::cli {
 // FFmpeg for videos, OpenCV for images. .mp4 is MPEG-4, .avi Motion JPEG, .mkv FFV1.
 class FfmpegCodecs : public Codecs {
    public:
-    void write_image(const std::filesystem::path& file, const Picture& image) override;
+    std::string encode_image(const std::filesystem::path& file, const Picture& image) override;
     std::string encoder_name() override;
-    std::unique_ptr<PartWriter> open_part(const std::filesystem::path& part,
+    std::unique_ptr<PartWriter> open_part(const std::filesystem::path& file,
                                           const std::filesystem::path& target, const Picture& first,
                                           double rate) override;
     void join(const std::vector<std::pair<std::filesystem::path, int>>& parts,
-              const std::filesystem::path& target, double rate,
+              const std::filesystem::path& file, const std::filesystem::path& target, double rate,
               const std::function<void()>& check) override;
 };
 

@@ -5,8 +5,7 @@
 #include "files.hpp"
 #include "open_frames.hpp"
 #include "xcalib/judge/documents.hpp"
-#include "xcalib/rig_file.hpp"
-#include "xcalib/stream/files.hpp"
+#include "xcalib/stream/outputs.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -17,10 +16,12 @@ struct Arguments {
     int width = 640, threads = 0;
 };
 
-void run(const Arguments& a, Console& console) {
-    const Rig rig = load_rig(a.rig);
+void run(const Arguments& a, bool has_json, Console& console) {
+    const Rig rig = load_rig(a.rig, console);
     Frames frames = open_frames(a.frames, rig, console);
-    if (!a.json_file.empty()) check_file_writable(a.json_file);
+    if (has_json)
+        check_writes({a.json_file}, frames,
+                     {a.rig, a.frames.reference_times, a.frames.source_times});
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
     Evaluator evaluator(rig, a.width, a.threads);
     std::vector<std::string> files;
@@ -33,7 +34,7 @@ void run(const Arguments& a, Console& console) {
     const Evaluation result = evaluator.result();
     console.line(result.table());
     const std::string document = evaluation_document(result, a.rig, files);
-    if (!a.json_file.empty()) write_file(a.json_file, document);
+    if (has_json) write_file(a.json_file, document);
     console.result(Json::parse(document));
     if (result.valid_share == 0)
         throw NotTrusted("no pixel is valid in " + std::to_string(frames.size()) +
@@ -49,7 +50,7 @@ void add_evaluate(CLI::App& app, Console& console) {
         "Score the registered SOURCE against REFERENCE, beside the source that is only resized.");
     auto arguments = std::make_shared<Arguments>();
     Arguments& a = *arguments;
-    command->add_option("RIG", a.rig)->required();
+    command->add_option("RIG", a.rig)->required()->check(kNamed);
     add_frames(*command, a.frames);
     command
         ->add_option("--width", a.width,
@@ -58,15 +59,16 @@ void add_evaluate(CLI::App& app, Console& console) {
         ->type_name("PX")
         ->check(CLI::Range(1, 2147483647))
         ->capture_default_str();
-    command
-        ->add_option("--json", a.json_file,
-                     "Also write all scores, frame by frame (JSON). On stdout: `xcalib-cli --json"
-                     " evaluate`.")
-        ->type_name("FILE");
+    CLI::Option* json =
+        command
+            ->add_option("--json", a.json_file,
+                         "Also write all scores, frame by frame (JSON). On stdout: `xcalib-cli"
+                         " --json evaluate`.")
+            ->type_name("FILE");
     add_colormap(*command, a.colormap);
     add_threads(*command, a.threads);
     command->add_flag("--quiet", console.quiet, "No progress.");
-    command->callback([arguments, &console] { run(*arguments, console); });
+    command->callback([arguments, json, &console] { run(*arguments, !json->empty(), console); });
 }
 
 }  // namespace xcalib::cli

@@ -50,7 +50,7 @@ class Pages : public Stream {
 };
 
 std::vector<Path> matching_files(const Path& pattern) {
-    static const std::regex numbered(R"((.*)%(0\d+)?d(.*))");
+    static const std::regex numbered(R"((.*)%(0\d{1,3})?d(.*))");
     std::smatch number;
     const std::string name = pattern.filename().string();
     std::vector<Path> found;
@@ -85,7 +85,7 @@ std::vector<Path> matching_files(const Path& pattern) {
 }
 
 bool is_pattern(const std::string& name) {
-    static const std::regex pattern(R"([*?\[]|%(0\d+)?d)");
+    static const std::regex pattern(R"([*?\[]|%(0\d{1,3})?d)");
     return std::regex_search(name, pattern);
 }
 

@@ -1,5 +1,9 @@
 // xcalib-cli: the Python command's work on rigs without Python, on the same core.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
@@ -10,6 +14,7 @@
 
 #include "commands.hpp"
 #include "xcalib/error.hpp"
+#include "xcalib/stream/files.hpp"
 #include "xcalib/stream/interrupts.hpp"
 
 namespace {
@@ -22,6 +27,16 @@ constexpr const char* kAbout =
     "or videos; #left, #right, #top or #bottom behind one takes half of each frame.\n\n"
     "Exit codes: 0 done and trusted, 1 failed, 2 wrong usage or input, 3 done, but the result is\n"
     "not to be trusted.\n";
+
+// Without it the message would be that a command is missing.
+void check_command(const CLI::App& app, int argc, char** argv) {
+    const auto first = std::find_if(argv + 1, argv + argc, [](char* word) { return *word != '-'; });
+    if (first == argv + argc) return;
+    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+    if (std::none_of(commands.begin(), commands.end(),
+                     [&](const CLI::App* command) { return command->check_name(*first); }))
+        throw xcalib::InputError("No such command '" + std::string(*first) + "'.");
+}
 
 int run(int argc, char** argv, Console& console) {
     CLI::App app(kAbout, "xcalib-cli");
@@ -36,7 +51,10 @@ int run(int argc, char** argv, Console& console) {
     add_register(app, console);
     add_evaluate(app, console);
     add_inspect(app, console);
+    add_join(app, console);
     add_bench(app, console);
+    for (int i = 1; i < argc; ++i) xcalib::check_name(argv[i]);
+    check_command(app, argc, argv);
     try {
         app.parse(argc, argv);
     } catch (const CLI::Success& wanted) {  // help, version
@@ -47,20 +65,37 @@ int run(int argc, char** argv, Console& console) {
     return kDone;
 }
 
+// A file that is opened must not take the place of a closed stdout, and what is said there.
+void keep_standard_streams() {
+    while (true) {
+        const int file = open("/dev/null", O_RDWR);
+        if (file < 0) return;
+        if (file > STDERR_FILENO) {
+            close(file);
+            return;
+        }
+    }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+    keep_standard_streams();
     // Libraries' own words on a bad file would come between our one line and its reader.
     setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
     setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 0);  // OpenCV reads EXR on request only
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    std::cerr.rdbuf(nullptr);
     const xcalib::Interrupts held;
     std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error like a full disk
+    std::signal(SIGPIPE, SIG_IGN);  // what is under way is brought to its end
     Console console;
     try {
         const int code = run(argc, argv, console);
         console.event("end", {{"exit_code", code}});
         return code;
+    } catch (const ClosedPipe&) {
+        return kFailed;
     } catch (const NotTrusted& error) {
         console.error(kNotTrusted, error.what());
         return kNotTrusted;

@@ -2,14 +2,30 @@
 
 #include "depth.hpp"
 #include "footage.hpp"
+#include "xcalib/rig_file.hpp"
+#include "xcalib/stream/oriented.hpp"
 #include "xcalib/stream/pairs.hpp"
 
 namespace xcalib::cli {
 
+Rig load_rig(const std::string& file, Console& console) {
+    const Rig rig = xcalib::load_rig(file);
+    for (const std::string& line : implausible(rig)) console.warn(file + ": " + line);
+    return rig;
+}
+
 Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& rig,
                    Console& console) {
     if (arguments.depth.spec.empty()) throw InputError("Missing option '--depth'.");
-    Pairs pairs(open_stream(arguments.reference), open_stream(arguments.source),
+    const bool turns = arguments.exif_orientation == "apply";
+    const auto opened = [&](const std::string& spec) {
+        const StreamPointer stream = open_stream(spec);
+        const std::string line = orientation_line(*stream, turns);
+        if (!line.empty()) console.note(line);
+        return turns ? oriented(stream) : stream;
+    };
+    const StreamPointer references = opened(arguments.reference);
+    Pairs pairs(references, opened(arguments.source),
                 {arguments.pairing, arguments.time_offset, arguments.max_gap,
                  arguments.reference_times, arguments.source_times});
     arguments.depth.plane.validate();
@@ -22,12 +38,14 @@ Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& ri
     if (rig && rig->relative_depth)
         console.note(
             "the rig was calibrated with relative depth: metres do not fit its translation");
-    return {pairs.references(), pairs.sources(), depth};
+    return {pairs.references(),  pairs.sources(),         depth,
+            pairs.all_sources(), pairs.pairing().sources, pairs.offset()};
 }
 
 Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& console) {
     std::string said;
-    frames.sources = scalar_sources(frames.sources, colormap, said);
+    frames.all_sources = scalar_sources(frames.all_sources, colormap, said);
+    frames.sources = picked(frames.all_sources, frames.partners);
     if (!said.empty()) console.note(said);
     return frames;
 }

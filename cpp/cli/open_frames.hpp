@@ -8,6 +8,9 @@
 
 namespace xcalib::cli {
 
+// The console warns of what is not plausible in it.
+Rig load_rig(const std::string& file, Console& console);
+
 // Paired; the console says how, where that was by time.
 Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& rig,
                    Console& console);

@@ -1,34 +1,21 @@
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 
 #include "xcalib/error.hpp"
 #include "xcalib/footage/pairing.hpp"
+#include "xcalib/threads.hpp"
 
 namespace xcalib::cli {
 namespace {
-
-std::optional<double> seconds(const std::string& text) {
-    if (text == "auto") return std::nullopt;
-    std::size_t used = 0;
-    double value = NAN;
-    try {
-        value = std::stod(text, &used);
-    } catch (const std::exception&) {
-    }
-    if (used != text.size() || !std::isfinite(value))
-        throw InputError("Invalid value for '--time-offset': '" + text +
-                         "' is neither `auto` nor a number of seconds");
-    return value;
-}
 
 void add_depth(CLI::App& command, DepthArguments& arguments) {
     command
         .add_option("--depth", arguments.spec,
                     "Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr"
                     " in m; 0 unknown), or `plane` for a flat road.")
-        ->type_name("DEPTH");
+        ->type_name("DEPTH")
+        ->check(kNamed);
     command.add_option("--depth-scale", arguments.scale, "Metres per count of 16-bit PNG depth.")
         ->type_name("M")
         ->default_str("1/256");
@@ -72,9 +59,11 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
     command
         .add_option_function<std::string>(
             "--time-offset",
-            [&arguments](const std::string& text) { arguments.time_offset = seconds(text); },
-            "By how much the source's clock is late [s], or `auto`: from the footage, and from its"
-            " registration where a rig is given.")
+            [&arguments](const std::string& text) {
+                arguments.time_offset = parse_time_offset(text);
+            },
+            "By how much the source's clock is late: seconds, source frames (`2f`), or `auto`:"
+            " from the footage, and from its registration.")
         ->type_name("S")
         ->default_str("0");
     command
@@ -86,18 +75,33 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
     command
         .add_option("--reference-times", arguments.reference_times,
                     "Times of the reference frames: lines `name timestamp`.  [default: their own]")
-        ->type_name("FILE");
+        ->type_name("FILE")
+        ->check(kNamed);
     command
         .add_option("--source-times", arguments.source_times,
                     "Times of the source frames: lines `name timestamp`.  [default: their own]")
-        ->type_name("FILE");
+        ->type_name("FILE")
+        ->check(kNamed);
+    command
+        .add_option("--exif-orientation", arguments.exif_orientation,
+                    "Image files that say how their picture is to be turned: take pixels as they"
+                    " are stored (ignore), or turn them (apply).")
+        ->type_name("HOW")
+        ->check(CLI::IsMember({"ignore", "apply"}))
+        ->capture_default_str();
 }
 
 }  // namespace
 
+const CLI::Validator kNamed(
+    [](std::string& name) {
+        return name.empty() ? "the name is empty, expected a file or a folder" : std::string();
+    },
+    "", "named");
+
 void add_frames(CLI::App& command, FrameArguments& arguments) {
-    command.add_option("REFERENCE", arguments.reference)->required();
-    command.add_option("SOURCE", arguments.source)->required();
+    command.add_option("REFERENCE", arguments.reference)->required()->check(kNamed);
+    command.add_option("SOURCE", arguments.source)->required()->check(kNamed);
     add_depth(command, arguments.depth);
     add_footage(command, arguments);
 }
@@ -105,7 +109,7 @@ void add_frames(CLI::App& command, FrameArguments& arguments) {
 void add_threads(CLI::App& command, int& threads) {
     command.add_option("--threads", threads, "Threads to use; 0 means all cores.")
         ->type_name("N")
-        ->check(CLI::NonNegativeNumber)
+        ->check(CLI::Range(0, kMaxThreads))
         ->capture_default_str();
 }
 

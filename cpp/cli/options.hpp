@@ -7,10 +7,12 @@
 
 #include "xcalib/depth/complete_depth.hpp"
 #include "xcalib/depth/plane_depth.hpp"
+#include "xcalib/footage/sequence.hpp"
 
 namespace CLI {
 class App;
-}
+class Validator;
+}  // namespace CLI
 
 namespace xcalib::cli {
 
@@ -26,13 +28,16 @@ struct FrameArguments {
     std::string reference, source;
     DepthArguments depth;
     std::string pairing = "auto";
-    std::optional<double> time_offset = 0.0;  // [s]; none: estimated
+    TimeOffset time_offset;
     std::optional<double> max_gap;
     std::string reference_times, source_times;
+    std::string exif_orientation = "ignore";
 };
 
 // REFERENCE, SOURCE and how they and their depth are read.
 void add_frames(CLI::App& command, FrameArguments& arguments);
+// Refuses an empty name, which stands for a folder elsewhere: for a variable that is not set.
+extern const CLI::Validator kNamed;
 void add_threads(CLI::App& command, int& threads);
 void add_colormap(CLI::App& command, std::string& colormap);
 

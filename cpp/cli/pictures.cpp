@@ -5,7 +5,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
+#include "xcalib/footage/exif.hpp"
 #include "xcalib/stream/files.hpp"
+#include "xcalib/stream/tiff.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -77,28 +79,32 @@ cv::Mat read_image(const Path& file) {
 
 cv::Mat decode(const Path& file) {
     if (!std::filesystem::is_regular_file(file)) throw InputError(file.string() + ": no such file");
-    const std::string data = read_file(file);
+    std::string data = read_file(file);
+    forget_tiff_orientation(data);
     cv::Mat pixels;
     if (!data.empty() && !is_truncated(data)) {
         try {
-            const cv::Mat bytes(1, static_cast<int>(data.size()), CV_8U,
-                                const_cast<char*>(data.data()));
+            const cv::Mat bytes(1, static_cast<int>(data.size()), CV_8U, data.data());
             pixels = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
         } catch (const cv::Exception&) {
             pixels.release();
         }
     }
+    const std::string type = pixels.empty() ? tiff_pixel_type(data) : "";
+    if (!type.empty() && type != "uint8" && type != "uint16" && type != "float32")
+        throw InputError(file.string() + ": pixels are " + type +
+                         ", expected uint8, uint16 or float32");
     if (pixels.empty())
         throw DecodeError(file.string() + ": cannot decode " + std::to_string(data.size()) +
                           " bytes, truncated or not an image");
     return pixels;
 }
 
-void write_image(const Path& file, const ImageView& image) {
+std::string encode_image(const Path& file, const ImageView& image) {
     std::vector<std::uint8_t> data;
     if (!cv::imencode(file.extension().string(), mat_of(image), data))
         throw std::runtime_error(file.string() + ": cannot encode " + size_text(image));
-    write_file(file, {reinterpret_cast<const char*>(data.data()), data.size()});
+    return {data.begin(), data.end()};
 }
 
 }  // namespace xcalib::cli

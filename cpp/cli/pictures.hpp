@@ -34,7 +34,7 @@ cv::Mat as_image(cv::Mat pixels, const std::string& where);
 // All channels as they are. Throws DecodeError.
 cv::Mat decode(const Path& file);
 
-// By the suffix; whole or not at all, its folder is made.
-void write_image(const Path& file, const ImageView& image);
+// A file of the kind that the suffix says.
+std::string encode_image(const Path& file, const ImageView& image);
 
 }  // namespace xcalib::cli

@@ -3,46 +3,38 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
-#include "files.hpp"
 #include "open_frames.hpp"
 #include "registration.hpp"
 #include "xcalib/option_words.hpp"
-#include "xcalib/rig_file.hpp"
+#include "xcalib/stream/outputs.hpp"
 
 namespace xcalib::cli {
 namespace {
 
-namespace fs = std::filesystem;
-
-void check_output(const RegisterArguments& a) {
-    const fs::path output = fs::weakly_canonical(a.output);
-    if (!a.live)
-        for (const std::string& input : {a.frames.reference, a.frames.source, a.frames.depth.spec})
-            if (fs::weakly_canonical(input) == output)
-                throw InputError("output folder " + a.output +
-                                 " is an input folder, expected another");
-    if (is_video_output(a.output)) check_file_writable(a.output);
-    else check_folder_writable(a.output);
-}
-
 void run(RegisterArguments a, Console& console) {
     a.options.registrar.occlusion = value_of<Occlusion>("--occlusion", a.occlusion);
-    const Rig rig = load_rig(a.rig);
+    const Rig rig = load_rig(a.rig, console);
     Registration totals;
+    check_output_writable(a.output);
     if (a.live) {
-        check_output(a);
         // What a camera shows is not to be had again: there is nothing to go on with.
         std::error_code none;
         const auto noted = std::filesystem::file_size(journal_of(a.output), none);
         if (!a.options.overwrite && !none && noted > 0)
             throw InputError(a.output +
                              " holds another run's frames, expected another output, or"
-                             " --overwrite");
+                             " --overwrite; `xcalib-cli join` makes a video of what a killed one"
+                             " has left");
+        check_alone(a.output);
+        check_apart({a.rig, a.frames.reference, a.frames.source},
+                    {output_files(a.output, {}, a.options.overlays), {}});
+        if (!a.options.overwrite)
+            check_not_others(a.output,
+                             output_files(a.output, {{"", six_digits(0)}}, a.options.overlays));
         totals = register_live(a, rig, console);
     } else {
         if (a.depth_fd >= 0) throw InputError("--depth-fd goes with --live");
         const Frames frames = open_frames(a.frames, rig, console);
-        check_output(a);
         totals = register_files(a, frames, rig, console);
     }
     const double share = totals.pixels ? static_cast<double>(totals.valid) / totals.pixels : 0.0;
@@ -68,7 +60,7 @@ void add_register(CLI::App& app, Console& console) {
         " /dev/video0), or any source\nthat OpenCV opens: a device, a URL, a GStreamer pipeline.");
     auto arguments = std::make_shared<RegisterArguments>();
     RegisterArguments& a = *arguments;
-    command->add_option("RIG", a.rig)->required();
+    command->add_option("RIG", a.rig)->required()->check(kNamed);
     add_frames(*command, a.frames);
     command
         ->add_option("-o,--output", a.output,

@@ -21,6 +21,11 @@ std::string text_of(const std::optional<double>& value, const char* none) {
     return value ? text_of(*value) : none;
 }
 
+std::string text_of(const TimeOffset& offset) {
+    if (offset.automatic) return "auto";
+    return offset.frames ? std::to_string(offset.frames) + "f" : text_of(offset.seconds);
+}
+
 std::string table_text(const std::string& file) {
     if (file.empty()) return "none";
     return absolute_path(file).string() + " (" + fingerprint(read_file(file)) + ")";
@@ -42,10 +47,11 @@ MadeWith inputs_of(const FrameArguments& frames) {
             {"complete", text_of(depth.complete)},
             {"completion_confidence", text_of(depth.completion_confidence)},
             {"pair", frames.pairing},
-            {"time_offset", text_of(frames.time_offset, "auto")},
+            {"time_offset", text_of(frames.time_offset)},
             {"max_gap", text_of(frames.max_gap, "none")},
             {"reference_times", table_text(frames.reference_times)},
-            {"source_times", table_text(frames.source_times)}};
+            {"source_times", table_text(frames.source_times)},
+            {"exif_orientation", frames.exif_orientation}};
 }
 
 }  // namespace
@@ -55,7 +61,8 @@ Registration register_files(const RegisterArguments& arguments, const Frames& fr
     FfmpegCodecs codecs;
     return register_frames(
         frames, rig, arguments.output, arguments.options, "xcalib-cli", inputs_of(arguments.frames),
-        codecs, [&](const Registration& now) {
+        {arguments.rig, arguments.frames.reference_times, arguments.frames.source_times}, codecs,
+        [&](const Registration& now) {
             console.show("registering", static_cast<double>(now.earlier + now.made) / now.frames,
                          now.line());
         });

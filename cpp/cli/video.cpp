@@ -1,5 +1,6 @@
 #include "video.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -21,13 +22,14 @@ class Video : public Stream {
         const double format = capture_.get(cv::CAP_PROP_CODEC_PIXEL_FORMAT);
         gray_ = holds_gray(format);
         deep_ = gray_ && static_cast<std::int64_t>(format) == kGray16;
-        const int announced = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_COUNT));
+        // Anything, of a damaged file.
+        const double announced = std::clamp(capture_.get(cv::CAP_PROP_FRAME_COUNT), 0.0, 1e9);
         while (capture_.grab()) frame_times_.push_back(capture_.get(cv::CAP_PROP_POS_MSEC) / 1e3);
         // Containers estimate their length to a frame or so; a file cut short lacks more.
         if (frame_times_.empty() || static_cast<double>(frame_times_.size()) < 0.99 * announced - 1)
             throw InputError(path_.string() + ": cannot decode frame " +
                              std::to_string(frame_times_.size()) + " of about " +
-                             std::to_string(announced) + ", truncated");
+                             std::to_string(std::lround(announced)) + ", truncated");
         bool rising = true;
         for (std::size_t i = 1; i < frame_times_.size(); ++i)
             rising = rising && frame_times_[i] > frame_times_[i - 1];

@@ -30,10 +30,20 @@ typedef enum xcalib_status {
  * expected. Holds until the next one fails; cut off where it is longer than 500 characters. */
 XCALIB_C_API const char* xcalib_last_error(void);
 
-/* A pinhole camera: u = fx X/Z + skew Y/Z + cx, v = fy Y/Z + cy. All in px. */
+/* OpenCV's models; coefficients that are not given are 0. */
+typedef enum xcalib_lens_model {
+    XCALIB_LENS_NONE = 0,
+    XCALIB_LENS_BROWN = 1,  /* k1 k2 p1 p2 k3 k4 k5 k6 */
+    XCALIB_LENS_FISHEYE = 2 /* k1 k2 k3 k4 */
+} xcalib_lens_model;
+
+/* A camera: u = fx x + skew y + cx, v = fy y + cy [px], where its lens shows (X/Z, Y/Z) at (x, y).
+ */
 typedef struct xcalib_camera {
     int width, height;
     double fx, fy, cx, cy, skew;
+    int lens; /* an xcalib_lens_model */
+    double lens_coefficients[8];
 } xcalib_camera;
 
 /* Two cameras fixed to each other; the source is registered to the reference. */

@@ -2,6 +2,7 @@
 #pragma once
 // clang-format off
 // What is estimated, and from what.
+#include "xcalib/lens.hpp"    // what a lens does to a pinhole's image
 #include "xcalib/camera.hpp"  // two cameras and their pose: a rig
 #include "xcalib/image.hpp"   // images and depth maps
 

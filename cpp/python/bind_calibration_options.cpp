@@ -63,6 +63,12 @@ void bind_cameras(py::class_<CalibrationOptions>& options) {
                        "Known intrinsics, frozen, or None.")
         .def_readwrite("source_camera", &CalibrationOptions::source_camera,
                        "Known intrinsics, frozen, or None.")
+        .def_readwrite("reference_lens", &CalibrationOptions::reference_lens,
+                       "Lens of the reference's images, frozen. None: that of reference_camera or "
+                       "of the initial rig, or none.")
+        .def_readwrite("source_lens", &CalibrationOptions::source_lens,
+                       "Lens of the source's images, frozen. None: that of source_camera or of "
+                       "the initial rig, or none.")
         .def_readwrite("reference_hfov_deg", &CalibrationOptions::reference_hfov_deg,
                        "Horizontal field of view to assume [deg], or None to search it.")
         .def_readwrite("optimize_reference", &CalibrationOptions::optimize_reference,

@@ -42,6 +42,19 @@ void bind_candidate_report(py::module_& m) {
         .def_readonly("refined", &CandidateReport::refined, "Rig, after the coarse levels.");
 }
 
+void bind_lens_report(py::module_& m) {
+    py::class_<LensReport>(m, "LensReport", "What k1 and k2 of the source's lens are worth.")
+        .def_readonly("tried", &LensReport::tried, "Was a lens fitted?")
+        .def_readonly("coefficients", &LensReport::coefficients,
+                      "Kept: 0, 1 (k1) or 2 (k1 and k2).")
+        .def_readonly(
+            "gain", &LensReport::gain,
+            "In NEC by the last one that was tried, of frames that the fit has not seen:\n"
+            "the mean; of all frames where they gain too little to look further.")
+        .def_readonly("gain_deviation", &LensReport::gain_deviation,
+                      "The standard deviation of that mean; 0 of all frames.");
+}
+
 void bind_adam_step(py::module_& m) {
     py::class_<AdamStep>(m, "AdamStep", "Before a step of Adam is taken: means over its batch.")
         .def_readonly("learning_rate", &AdamStep::learning_rate, "Learning rate of the step.")
@@ -51,12 +64,37 @@ void bind_adam_step(py::module_& m) {
         .def_readonly("total", &AdamStep::total, "Eq. (total_loss).");
 }
 
+void bind_lag_report(py::module_& m) {
+    py::class_<LagFit>(m, "LagFit", "The fit with the sources some frames later, refitted.")
+        .def_readonly("lag", &LagFit::lag,
+                      "That a source is later than its own frame [source frames].")
+        .def_readonly("frames", &LagFit::frames, "References that have such a source.")
+        .def_readonly("factor", &LagFit::factor,
+                      "Reduction of the level of the last fit: better lags are fitted further.")
+        .def_readonly("nec", &LagFit::nec, "Mean over the frames, there.")
+        .def_readonly("gain", &LagFit::gain,
+                      "NEC of a frame above the same with its own source, there: mean.")
+        .def_readonly("error", &LagFit::error, "Standard error of the gain.")
+        .def_readonly("rig", &LagFit::rig, "Rig, refitted.");
+    py::class_<LagReport>(m, "LagReport", "By how much the source is late beside its pairing.")
+        .def_readonly("frames", &LagReport::frames,
+                      "[source frames]; 0 too where the fits do not show it.")
+        .def_readonly("change", &LagReport::change,
+                      "By how many frames the lag of the later half of the footage is the larger, "
+                      "where the halves differ.")
+        .def_readonly("fits", &LagReport::fits,
+                      "LagFit, by rising lag; none where the footage is no sequence.")
+        .def("line", &LagReport::line, "How the fits compare.");
+}
+
 }  // namespace
 
 void bind_calibration_report(py::module_& m) {
     bind_level_report(m);
     bind_candidate_report(m);
+    bind_lens_report(m);
     bind_adam_step(m);
+    bind_lag_report(m);
     py::class_<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
         .def_readonly("verdict", &CalibrationReport::verdict, "Verdict.")
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
@@ -98,7 +136,9 @@ void bind_calibration_report(py::module_& m) {
         .def_readonly("candidates", &CalibrationReport::candidates,
                       "Candidates of the search, best score first.")
         .def_readonly("levels", &CalibrationReport::levels, "In the order solved.")
+        .def_readonly("lens", &CalibrationReport::lens, "LensReport, of solver 'ceres'.")
         .def_readonly("steps", &CalibrationReport::steps, "AdamStep, of solver 'adam'.")
+        .def_readonly("lag", &CalibrationReport::lag, "LagReport, where the footage is a sequence.")
         .def(
             "expected_error_map",
             [](const CalibrationReport& report, double depth, int width, int height, double share) {

@@ -44,31 +44,36 @@ Rig make_rig(const Pinhole& reference, const Pinhole& source, const py::object& 
 std::string text_of(const Pinhole& c) {
     std::ostringstream out;
     out << "Pinhole(width=" << c.width << ", height=" << c.height << ", fx=" << c.fx
-        << ", fy=" << c.fy << ", cx=" << c.cx << ", cy=" << c.cy << ", skew=" << c.skew << ")";
+        << ", fy=" << c.fy << ", cx=" << c.cx << ", cy=" << c.cy << ", skew=" << c.skew;
+    if (c.lens.model() != LensModel::none)
+        out << ", lens=" << std::string(py::repr(py::cast(c.lens)));
+    out << ")";
     return out.str();
 }
 
 void bind_pinhole(py::module_& m) {
-    py::class_<Pinhole>(m, "Pinhole", R"(A pinhole camera, Eq. (intrinsic) of the paper.
+    py::class_<Pinhole>(m, "Pinhole",
+                        R"(A pinhole camera, Eq. (intrinsic) of the paper, and its lens.
 
 Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.)")
         .def(py::init([](int width, int height, double fx, double fy, double cx, double cy,
-                         double skew) {
-                 const Pinhole camera{width, height, fx, fy, cx, cy, skew};
+                         double skew, const std::optional<Lens>& lens) {
+                 const Pinhole camera{width, height, fx, fy, cx, cy, skew, lens.value_or(Lens())};
                  camera.validate("Pinhole");
                  return camera;
              }),
              py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
-             py::arg("cy"), py::arg("skew") = 0.0,
+             py::arg("cy"), py::arg("skew") = 0.0, py::arg("lens") = py::none(),
              "Raises ValueError where a size is below 1, a focal length not > 0, or a value not "
              "finite.")
         .def_static(
             "from_hfov",
-            [](int width, int height, double hfov_deg) {
-                return Pinhole::from_hfov(width, height, hfov_deg * kDegree);
+            [](int width, int height, double hfov_deg, const std::optional<Lens>& lens) {
+                return Pinhole::from_hfov(width, height, hfov_deg * kDegree, lens.value_or(Lens()));
             },
-            py::arg("width"), py::arg("height"), py::arg("hfov_deg"),
-            "Square pixels and the principal point at the centre; hfov_deg in (0, 180).")
+            py::arg("width"), py::arg("height"), py::arg("hfov_deg"), py::arg("lens") = py::none(),
+            "Square pixels and the principal point at the centre; hfov_deg in (0, 180), and no "
+            "wider than what the lens shows.")
         .def_readwrite("width", &Pinhole::width, "[px]")
         .def_readwrite("height", &Pinhole::height, "[px]")
         .def_readwrite("fx", &Pinhole::fx, "[px]")
@@ -76,10 +81,11 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readwrite("cx", &Pinhole::cx, "[px]")
         .def_readwrite("cy", &Pinhole::cy, "[px]")
         .def_readwrite("skew", &Pinhole::skew, "[px]")
+        .def_readwrite("lens", &Pinhole::lens, "Lens between (X/Z, Y/Z) and K.")
         .def_property_readonly("K", &Pinhole::K, "(3, 3) float64 intrinsic matrix [px].")
         .def_property_readonly(
             "hfov_deg", [](const Pinhole& c) { return c.hfov() / kDegree; },
-            "Horizontal field of view, 2 atan(width / (2 fx)) [deg].")
+            "Horizontal field of view, 2 atan(width / (2 fx)) without a lens [deg].")
         .def_property_readonly(
             "vfov_deg", [](const Pinhole& c) { return c.vfov() / kDegree; },
             "Vertical field of view [deg].")
@@ -132,8 +138,9 @@ void bind_rig_pose(py::class_<Rig>& rig) {
                 return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
             },
             "(4,) float64 unit quaternion of R.")
-        .def_property_readonly("infinite_homography", &infinite_homography,
-                               "(3, 3) float64, K_S R K_R^-1: where points at infinity go.");
+        .def_property_readonly(
+            "infinite_homography", &infinite_homography,
+            "(3, 3) float64, K_S R K_R^-1: where points at infinity go, lenses aside.");
 }
 
 void bind_rig_files(py::class_<Rig>& rig) {

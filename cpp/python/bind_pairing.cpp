@@ -44,6 +44,8 @@ void bind_pairing_classes(py::module_& m) {
             "Frames of either stream without a partner.")
         .def_readonly("gap", &Pairing::gap, "Median distance in time, the offset allowed for [s].")
         .def_readonly("offset", &Pairing::offset, "By how much the source's clock is late [s].")
+        .def_readonly("lag", &Pairing::lag,
+                      "By how many of its frames the source is late beyond that.")
         .def("line", &Pairing::line, "What happened, in one line.");
 }
 

@@ -78,17 +78,22 @@ times.)");
                          std::optional<double> time_offset, std::optional<double> max_gap,
                          const std::optional<std::filesystem::path>& reference_times,
                          const std::optional<std::filesystem::path>& source_times,
-                         std::optional<OffsetEstimate> estimate) {
+                         std::optional<OffsetEstimate> estimate, int frame_offset) {
                  return Pairs(std::move(references), std::move(sources),
-                              {std::move(method), time_offset, max_gap,
-                               reference_times.value_or(""), source_times.value_or("")},
+                              {std::move(method),
+                               {!time_offset, time_offset.value_or(0.0), frame_offset},
+                               max_gap,
+                               reference_times.value_or(""),
+                               source_times.value_or("")},
                               std::move(estimate));
              }),
              py::arg("references"), py::arg("sources"), py::arg("method") = "auto",
              py::arg("time_offset") = 0.0, py::arg("max_gap") = py::none(),
              py::arg("reference_times") = py::none(), py::arg("source_times") = py::none(),
-             py::arg("estimate") = py::none(), Unlocked(),
-             "As pair_streams(); time_offset None: estimated. The tables are read by read_times(). "
+             py::arg("estimate") = py::none(), py::arg("frame_offset") = 0, Unlocked(),
+             "As pair_streams(); time_offset None: estimated; frame_offset: by how many of its "
+             "frames "
+             "the source is late beyond that. The tables are read by read_times(). "
              "Nothing else is read, save that an offset to be estimated, unless there is an "
              "estimate, needs the frames.")
         .def(
@@ -105,10 +110,14 @@ times.)");
             "open_depth(used): the provider of the depth of these of all references. Without an "
             "estimated offset "
             "the pairs stay as they are, and so they do where the registered frames tell neither "
-            "around the estimate nor around 0.")
+            "around the estimate nor around 0. Sequences without times are looked at up to 6 "
+            "frames "
+            "either way.")
         .def_property_readonly("references", &Pairs::references, "Those that have a partner.")
         .def_property_readonly("sources", &Pairs::sources, "Their partners, in the same order.")
         .def_property_readonly("all_references", &Pairs::all_references, "With those that do not.")
+        .def_property_readonly("all_sources", &Pairs::all_sources, "With those that do not.")
+        .def_property_readonly("offset", &Pairs::offset, "TimeOffset that they are paired with.")
         .def_property_readonly("pairing", &Pairs::pairing, "Indices into the streams.")
         .def_property_readonly("notes", &Pairs::notes, "What the user should know, a line each.");
 }

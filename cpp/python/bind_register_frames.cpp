@@ -17,7 +17,7 @@ class PythonPart : public PartWriter {
     explicit PythonPart(Kept encoder) : encoder_(std::move(encoder)) {}
     ~PythonPart() override {
         try {
-            in_python([&] { encoder_->attr("discard")(); });
+            in_python([&] { encoder_->attr("end")(); });
         } catch (const std::exception&) {
             // Something else has gone wrong before.
         }
@@ -37,20 +37,23 @@ class PythonCodecs : public Codecs {
    public:
     explicit PythonCodecs(py::object codecs) : codecs_(kept(std::move(codecs))) {}
 
-    void write_image(const Path& file, const Picture& image) override {
-        in_python([&] { codecs_->attr("write_image")(file, array_of(image)); });
+    std::string encode_image(const Path& file, const Picture& image) override {
+        return in_python([&] {
+            return codecs_->attr("encode_image")(file, array_of(image)).cast<std::string>();
+        });
     }
     std::string encoder_name() override {
         return in_python([&] { return codecs_->attr("encoder_name")().cast<std::string>(); });
     }
-    std::unique_ptr<PartWriter> open_part(const Path& part, const Path& target,
+    std::unique_ptr<PartWriter> open_part(const Path& file, const Path& target,
                                           const Picture& first, double rate) override {
         return std::make_unique<PythonPart>(in_python(
-            [&] { return kept(codecs_->attr("Encoder")(part, target, array_of(first), rate)); }));
+            [&] { return kept(codecs_->attr("Encoder")(file, target, array_of(first), rate)); }));
     }
-    void join(const std::vector<std::pair<Path, int>>& parts, const Path& target, double rate,
-              const std::function<void()>& check) override {
-        in_python([&] { codecs_->attr("join")(parts, target, rate, py::cpp_function(check)); });
+    void join(const std::vector<std::pair<Path, int>>& parts, const Path& file, const Path& target,
+              double rate, const std::function<void()>& check) override {
+        in_python(
+            [&] { codecs_->attr("join")(parts, file, target, rate, py::cpp_function(check)); });
     }
 
    private:
@@ -94,8 +97,9 @@ void bind_register_frames(py::module_& m) {
         "register_frames",
         [](StreamPointer references, StreamPointer sources, py::object depth,
            const Registrar& registrar, const Path& output, bool overlays, bool overwrite,
-           int part_frames, const MadeWith& inputs, py::object codecs,
-           const std::function<void(const Registration&)>& progress, bool hold_interrupts) {
+           int part_frames, const MadeWith& inputs, const std::vector<Path>& other_reads,
+           py::object codecs, const std::function<void(const Registration&)>& progress,
+           bool hold_interrupts) {
             const Frames frames{std::move(references), std::move(sources),
                                 std::make_shared<PythonDepth>(std::move(depth))};
             PythonCodecs compress(std::move(codecs));
@@ -104,7 +108,7 @@ void bind_register_frames(py::module_& m) {
             if (hold_interrupts) held.emplace();
             return register_frames(frames, registrar.rig(), output,
                                    {registrar.options(), overlays, overwrite, part_frames},
-                                   "xcalib", inputs, compress,
+                                   "xcalib", inputs, other_reads, compress,
                                    [&progress](const Registration& now) {
                                        const py::gil_scoped_acquire locked;
                                        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -113,13 +117,15 @@ void bind_register_frames(py::module_& m) {
         },
         py::arg("references"), py::arg("sources"), py::arg("depth"), py::arg("registrar"),
         py::arg("output"), py::arg("overlays"), py::arg("overwrite"), py::arg("part_frames"),
-        py::arg("inputs"), py::arg("codecs"), py::arg("progress"), py::arg("hold_interrupts"),
+        py::arg("inputs"), py::arg("other_reads"), py::arg("codecs"), py::arg("progress"),
+        py::arg("hold_interrupts"),
         R"(Registers all frames that an earlier run has not written, and returns the Registration.
 
 registrar: with a rig and options to register by; its threads are those of the whole run. part_frames:
 of a video, that a run that is killed can lose at most. inputs: (name, text) of all that the frames
-were opened with; an output of others is refused. codecs: has write_image(file, image),
-encoder_name(), Encoder(part, target, first, rate) and join(parts, target, rate, check).
+were opened with; an output of others is refused. other_reads: files that were read besides those of
+the frames; nothing that is read is written to. codecs: has encode_image(file, image), which returns
+bytes, encoder_name(), Encoder(file, target, first, rate) and join(parts, file, target, rate, check).
 progress(registration) is called in this thread after frames, and a few times a second. hold_interrupts:
 in the main thread, SIGINT and SIGTERM end the run between two frames, by KeyboardInterrupt.)");
 }

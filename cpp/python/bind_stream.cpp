@@ -3,6 +3,8 @@
 
 #include "bindings.hpp"
 #include "from_python.hpp"
+#include "xcalib/footage/exif.hpp"
+#include "xcalib/stream/oriented.hpp"
 #include "xcalib/stream/stream.hpp"
 
 namespace xcalib {
@@ -133,6 +135,25 @@ file(index) where that is not where(index); and parallel = True if several threa
 
 colormap: auto (a few frames, spread over the footage, are read to decide), none (images as they
 are), or the name of a known map.)");
+    m.def(
+        "oriented", py::overload_cast<StreamPointer>(&oriented), py::arg("stream"),
+        "A stream of image files, each turned as its EXIF orientation asks for; another stream as "
+        "it is.");
+    m.def(
+        "orientation_line", &orientation_line, py::arg("stream"), py::arg("applied"), Unlocked(),
+        "A line where the first file of the stream asks for a turn, or ''. applied: whether it is "
+        "turned.");
+    m.def(
+        "as_stored",
+        [](const std::string& file) {
+            std::string data = file;
+            forget_tiff_orientation(data);
+            return py::bytes(data);
+        },
+        py::arg("file"),
+        "The bytes of an image file, of a TIFF as if it did not say how its picture is to be "
+        "turned: "
+        "OpenCV would do so, which it does with no other.");
 }
 
 }  // namespace xcalib

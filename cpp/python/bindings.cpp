@@ -31,6 +31,7 @@ PYBIND11_MODULE(_core, m) {
 
     // In this order: signatures name the classes that are known by then.
     xcalib::bind_verdict(m);
+    xcalib::bind_lens(m);
     xcalib::bind_camera(m);
     xcalib::bind_calibration_options(m);
     xcalib::bind_calibration_report(m);
@@ -51,8 +52,11 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_steady_depth(m);
 
     xcalib::bind_stream(m);
+    xcalib::bind_sequence(m);
     xcalib::bind_pairs(m);
     xcalib::bind_frames(m);
+    xcalib::bind_lags(m);
+    xcalib::bind_files(m);
     xcalib::bind_register_frames(m);
 
     xcalib::bind_evaluate(m);

@@ -8,6 +8,7 @@
 namespace xcalib {
 
 void bind_verdict(pybind11::module_& m);
+void bind_lens(pybind11::module_& m);
 void bind_camera(pybind11::module_& m);
 void bind_calibration_options(pybind11::module_& m);
 void bind_calibration_report(pybind11::module_& m);
@@ -18,6 +19,7 @@ void bind_flow(pybind11::module_& m);
 
 void bind_pairing(pybind11::module_& m);
 void bind_clock_offset(pybind11::module_& m);
+void bind_files(pybind11::module_& m);
 void bind_fingerprint(pybind11::module_& m);
 void bind_choose(pybind11::module_& m);
 void bind_false_colour(pybind11::module_& m);
@@ -29,7 +31,9 @@ void bind_steady_depth(pybind11::module_& m);
 
 void bind_stream(pybind11::module_& m);
 void bind_pairs(pybind11::module_& m);
+void bind_sequence(pybind11::module_& m);
 void bind_frames(pybind11::module_& m);
+void bind_lags(pybind11::module_& m);
 void bind_register_frames(pybind11::module_& m);
 
 void bind_evaluate(pybind11::module_& m);

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
         CalibrationResult,
         CandidateReport,
         ExpectedError,
+        LagFit,
+        LagReport,
+        Lens,
+        LensReport,
         LevelReport,
         Pinhole,
         Registrar,
@@ -26,6 +30,7 @@ if TYPE_CHECKING:
         Tolerance,
         Verdict,
         calibrate,
+        fit_lags,
     )
     from xcalib.choose import choose_frames
 
@@ -58,6 +63,10 @@ __all__ = [
     "CalibrationResult",
     "CandidateReport",
     "ExpectedError",
+    "LagFit",
+    "LagReport",
+    "Lens",
+    "LensReport",
     "LevelReport",
     "Pinhole",
     "Registrar",
@@ -68,5 +77,6 @@ __all__ = [
     "Verdict",
     "calibrate",
     "choose_frames",
+    "fit_lags",
     "metrics",
 ]

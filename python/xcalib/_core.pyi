@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, overload
@@ -12,8 +12,41 @@ class InputError(ValueError):
 class DecodeError(InputError):
     """A file that cannot be decoded: truncated, or not what its name says."""
 
+class Lens:
+    """What a lens does to a pinhole's image: OpenCV's models and coefficients.
+
+    brown: k1 k2 p1 p2 [k3 [k4 k5 k6]]; fisheye: k1 k2 k3 k4; none. Points are normalized:
+    (X/Z, Y/Z) before the lens, and what the intrinsic matrix takes to pixels after it.
+    """
+
+    def __init__(self, model: str = "none", coefficients: Sequence[float] = []) -> None:
+        """Raises ValueError where the model is unknown, or has not so many coefficients."""
+    @staticmethod
+    def parse(option: str, word: str) -> Lens | None:
+        """The lens of a word as --source-lens takes it, 'brown:K1,K2,P1,P2'; None for 'auto'.
+        InputError, naming the option, otherwise.
+        """
+    @property
+    def model(self) -> str:
+        """'none', 'brown' or 'fisheye'."""
+    @property
+    def coefficients(self) -> list[float]:
+        """As many as were given."""
+    @property
+    def bends(self) -> bool:
+        """Whether it does anything."""
+    @property
+    def max_radius(self) -> float:
+        """Points farther from the axis, before the lens, have no image."""
+    def distort(self, points: NDArray[Any]) -> NDArray[float64]:
+        """(N, 2) where the lens shows points (N, 2); NaN where nowhere."""
+    def undistort(self, points: NDArray[Any]) -> NDArray[float64]:
+        """(N, 2) points that the lens shows at (N, 2); NaN where none."""
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
 class Pinhole:
-    """A pinhole camera, Eq. (intrinsic) of the paper.
+    """A pinhole camera, Eq. (intrinsic) of the paper, and its lens.
 
     Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.
     """
@@ -32,6 +65,8 @@ class Pinhole:
     """[px]"""
     skew: float
     """[px]"""
+    lens: Lens
+    """Lens between (X/Z, Y/Z) and K."""
 
     def __init__(
         self,
@@ -42,19 +77,22 @@ class Pinhole:
         cx: float,
         cy: float,
         skew: float = 0.0,
+        lens: Lens | None = None,
     ) -> None:
         """Raises ValueError where a size is below 1, a focal length not > 0, or a value not
         finite.
         """
     @staticmethod
-    def from_hfov(width: int, height: int, hfov_deg: float) -> Pinhole:
-        """Square pixels and the principal point at the centre; hfov_deg in (0, 180)."""
+    def from_hfov(width: int, height: int, hfov_deg: float, lens: Lens | None = None) -> Pinhole:
+        """Square pixels and the principal point at the centre; hfov_deg in (0, 180), and no
+        wider than what the lens shows.
+        """
     @property
     def K(self) -> NDArray[float64]:
         """(3, 3) float64 intrinsic matrix [px]."""
     @property
     def hfov_deg(self) -> float:
-        """Horizontal field of view, 2 atan(width / (2 fx)) [deg]."""
+        """Horizontal field of view, 2 atan(width / (2 fx)) without a lens [deg]."""
     @property
     def vfov_deg(self) -> float:
         """Vertical field of view [deg]."""
@@ -164,7 +202,7 @@ class Rig:
         """
     @property
     def infinite_homography(self) -> NDArray[float64]:
-        """(3, 3) float64, K_S R K_R^-1: where points at infinity go."""
+        """(3, 3) float64, K_S R K_R^-1: where points at infinity go, lenses aside."""
     def resized(
         self, reference_width: int, reference_height: int, source_width: int, source_height: int
     ) -> Rig:
@@ -261,6 +299,14 @@ class CalibrationOptions:
     """Known intrinsics, frozen, or None."""
     source_camera: Pinhole | None
     """Known intrinsics, frozen, or None."""
+    reference_lens: Lens | None
+    """Lens of the reference's images, frozen. None: that of reference_camera or of the initial
+    rig, or none.
+    """
+    source_lens: Lens | None
+    """Lens of the source's images, frozen. None: that of source_camera or of the initial rig, or
+    none.
+    """
     reference_hfov_deg: float | None
     """Horizontal field of view to assume [deg], or None to search it."""
     optimize_reference: bool
@@ -351,6 +397,22 @@ class CandidateReport:
     def refined(self) -> Rig:
         """Rig, after the coarse levels."""
 
+class LensReport:
+    """What k1 and k2 of the source's lens are worth."""
+    @property
+    def tried(self) -> bool:
+        """Was a lens fitted?"""
+    @property
+    def coefficients(self) -> int:
+        """Kept: 0, 1 (k1) or 2 (k1 and k2)."""
+    @property
+    def gain(self) -> float:
+        """In NEC by the last one that was tried, of frames that the fit has not seen:
+        the mean; of all frames where they gain too little to look further."""
+    @property
+    def gain_deviation(self) -> float:
+        """The standard deviation of that mean; 0 of all frames."""
+
 class AdamStep:
     """Before a step of Adam is taken: means over its batch."""
     @property
@@ -368,6 +430,46 @@ class AdamStep:
     @property
     def total(self) -> float:
         """Eq. (total_loss)."""
+
+class LagFit:
+    """The fit with the sources some frames later, refitted."""
+    @property
+    def lag(self) -> int:
+        """That a source is later than its own frame [source frames]."""
+    @property
+    def frames(self) -> int:
+        """References that have such a source."""
+    @property
+    def factor(self) -> int:
+        """Reduction of the level of the last fit: better lags are fitted further."""
+    @property
+    def nec(self) -> float:
+        """Mean over the frames, there."""
+    @property
+    def gain(self) -> float:
+        """NEC of a frame above the same with its own source, there: mean."""
+    @property
+    def error(self) -> float:
+        """Standard error of the gain."""
+    @property
+    def rig(self) -> Rig:
+        """Rig, refitted."""
+
+class LagReport:
+    """By how much the source is late beside its pairing."""
+    @property
+    def frames(self) -> int:
+        """[source frames]; 0 too where the fits do not show it."""
+    @property
+    def change(self) -> int:
+        """By how many frames the lag of the later half of the footage is the larger, where the
+        halves differ.
+        """
+    @property
+    def fits(self) -> list[LagFit]:
+        """LagFit, by rising lag; none where the footage is no sequence."""
+    def line(self) -> str:
+        """How the fits compare."""
 
 class CalibrationReport:
     """How a calibration went."""
@@ -439,8 +541,14 @@ class CalibrationReport:
     def levels(self) -> list[LevelReport]:
         """In the order solved."""
     @property
+    def lens(self) -> LensReport:
+        """LensReport, of solver 'ceres'."""
+    @property
     def steps(self) -> list[AdamStep]:
         """AdamStep, of solver 'adam'."""
+    @property
+    def lag(self) -> LagReport:
+        """LagReport, where the footage is a sequence."""
     def expected_error_map(
         self, depth: float, width: int = 64, height: int = 48, share: float = 0.5
     ) -> NDArray[float32]:
@@ -721,6 +829,9 @@ class Pairing:
     @property
     def offset(self) -> float:
         """By how much the source's clock is late [s]."""
+    @property
+    def lag(self) -> int:
+        """By how many of its frames the source is late beyond that."""
     def line(self) -> str:
         """What happened, in one line."""
 
@@ -1035,6 +1146,21 @@ class Half(Stream):
     def __init__(self, stream: Stream, half: str) -> None:
         """half: left, right, top or bottom."""
 
+def oriented(stream: Stream) -> Stream:
+    """A stream of image files, each turned as its EXIF orientation asks for; another stream as
+    it is.
+    """
+
+def orientation_line(stream: Stream, applied: bool) -> str:
+    """A line where the first file of the stream asks for a turn, or ''. applied: whether it is
+    turned.
+    """
+
+def as_stored(file: bytes) -> bytes:
+    """The bytes of an image file, of a TIFF as if it did not say how its picture is to be
+    turned: OpenCV would do so, which it does with no other.
+    """
+
 def read_times(table: str | PathLike[str], stream: Stream) -> list[float]:
     """Seconds of the frames of a stream from a file of `name timestamp` lines, see
     times_of_table().
@@ -1103,6 +1229,26 @@ def refine_offset(
     are left out. Raises InputError without candidates or times.
     """
 
+class TimeOffset:
+    """What --time-offset says."""
+    @property
+    def automatic(self) -> bool:
+        """To be found from the footage."""
+    @property
+    def seconds(self) -> float:
+        """By which the source's clock is late."""
+    @property
+    def frames(self) -> int:
+        """By how many of its frames the source is late beyond that."""
+
+def parse_time_offset(text: str) -> TimeOffset:
+    """`auto`, seconds (0.1), or source frames (2f). Raises InputError."""
+
+def is_sequence(stream: Stream) -> bool:
+    """Whether frames follow each other: their times are at most a second apart, or one number in
+    their names rises, by one as a rule.
+    """
+
 class Pairs:
     """Two streams, and which of their frames belong together."""
     def __init__(
@@ -1115,16 +1261,19 @@ class Pairs:
         reference_times: str | PathLike[str] | None = None,
         source_times: str | PathLike[str] | None = None,
         estimate: OffsetEstimate | None = None,
+        frame_offset: int = 0,
     ) -> None:
-        """As pair_streams(); time_offset None: estimated. The tables are read by read_times().
-        Nothing else is read, save that an offset to be estimated, unless there is an
-        estimate, needs the frames.
+        """As pair_streams(); time_offset None: estimated; frame_offset: by how many of its
+        frames the source is late beyond that. The tables are read by read_times(). Nothing
+        else is read, save that an offset to be estimated, unless there is an estimate, needs
+        the frames.
         """
     def refine(self, rig: Rig, open_depth: Callable[[list[int]], Any]) -> None:
         """Pairs anew with the offset at which frames register best with the rig.
         open_depth(used): the provider of the depth of these of all references. Without an
         estimated offset the pairs stay as they are, and so they do where the registered
-        frames tell neither around the estimate nor around 0.
+        frames tell neither around the estimate nor around 0. Sequences without times are
+        looked at up to 6 frames either way.
         """
     @property
     def references(self) -> Stream:
@@ -1135,6 +1284,12 @@ class Pairs:
     @property
     def all_references(self) -> Stream:
         """With those that do not."""
+    @property
+    def all_sources(self) -> Stream:
+        """With those that do not."""
+    @property
+    def offset(self) -> TimeOffset:
+        """TimeOffset that they are paired with."""
     @property
     def pairing(self) -> Pairing:
         """Indices into the streams."""
@@ -1166,6 +1321,105 @@ def left_out(count: int, first: str) -> str:
 
 def with_file_name(message: str, images: Stream, chosen: Sequence[int]) -> str:
     """The message with the file that the core, which sees arrays only, calls `frame N`."""
+
+def fit_lags(
+    references: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    sources: Mapping[int, Sequence[NDArray[Any] | None]],
+    rig: Rig,
+    options: CalibrationOptions = ...,
+) -> LagReport:
+    """Whether the source is late by whole frames: a LagReport.
+
+    references, depths: a dozen of the frames that rig was fitted to, with options, as
+    calibrate() takes them, spread over the footage. sources: by lag, 0 among them, a list
+    with the source so many frames later than each reference's own, None where the footage has
+    none. At each lag the rig is refitted, and the NEC of the same references compared.
+    """
+
+def look_at_lags(
+    references: Sequence[NDArray[Any]],
+    sources: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    partners: Sequence[int],
+    all_sources: Stream,
+    rig: Rig,
+    options: CalibrationOptions,
+    progress: Callable[[float], object],
+) -> LagReport:
+    """fit_lags() of a dozen of the frames that rig was fitted to, with options.
+
+    partners: the indices of their sources in all_sources, from which those before and after
+    them are read. Where all_sources is no sequence, or the footage is short, nothing is.
+    progress: is called with the share of the frames read.
+    """
+
+def add_lags(
+    result: CalibrationResult, lag: LagReport, offset: TimeOffset, all_sources: Stream
+) -> None:
+    """Puts the report into the result, which is no longer trusted if the source is late beyond
+    offset.
+    """
+
+def frames_later(
+    all_sources: Stream, partners: Sequence[int], lag: int
+) -> tuple[list[int], list[int]]:
+    """Of pairs with these partners in all_sources: those that have one lag frames later, and
+    these partners.
+    """
+
+def max_threads() -> int:
+    """How many threads may be asked for."""
+
+def implausible(rig: Rig) -> list[str]:
+    """What of a rig is so unlikely that another unit or a slip may be behind it, a line each."""
+
+def read_text(file: str | PathLike[str]) -> str:
+    """A text that people write: InputError where it is no file, larger than 1 MiB, or not UTF-8."""
+
+def read_file(file: str | PathLike[str]) -> bytes:
+    """The bytes of a file: InputError where it is none, as a pipe, or larger than 1 GiB."""
+
+def read_npy(file: str | PathLike[str]) -> NDArray[float32]:
+    """(h, w) float32 of a .npy file of one channel of floats; DecodeError where it is none."""
+
+def tiff_pixel_type(data: bytes) -> str:
+    """The type of a TIFF's pixels, as numpy calls it; '' where the data does not say."""
+
+def write_file(file: str | PathLike[str], data: bytes) -> None:
+    """Writes bytes: under the file's name only when they are complete and on the disk.
+
+    Its folder is made. What stands there is replaced; a link is followed; a pipe or a device
+    is written to as it is. Raises InputError where that cannot be.
+    """
+
+def keep_file(partial: str | PathLike[str], file: str | PathLike[str]) -> None:
+    """Gives a complete file, first made sure to be on the disk, its name."""
+
+def list_files(folder: str | PathLike[str], suffixes: Sequence[str]) -> list[Path]:
+    """Files of a folder with one of the suffixes (any case), in natural order, at least one."""
+
+def check_folder_writable(folder: str | PathLike[str]) -> None:
+    """Raises InputError now, before long work, if nothing can be written below a folder, which
+    need not exist, and is not made.
+    """
+
+def check_file_writable(file: str | PathLike[str]) -> None:
+    """Raises InputError now, before long work, if a file cannot be written."""
+
+def check_output_writable(output: str | PathLike[str]) -> None:
+    """Raises InputError now if a folder or a video, as register writes, cannot be."""
+
+def check_writes(
+    files: Sequence[str | PathLike[str]],
+    references: Stream,
+    sources: Stream,
+    depth: Any,
+    other_reads: Sequence[str | PathLike[str]],
+) -> None:
+    """Raises InputError if a run on these frames cannot write to all of the files, reads one of
+    them, or would write one twice.
+    """
 
 class Registration:
     """How far a stream is registered, and its totals."""
@@ -1205,6 +1459,7 @@ def register_frames(
     overwrite: bool,
     part_frames: int,
     inputs: Sequence[tuple[str, str]],
+    other_reads: Sequence[str | PathLike[str]],
     codecs: object,
     progress: Callable[[Registration], object],
     hold_interrupts: bool,
@@ -1213,9 +1468,10 @@ def register_frames(
 
     registrar: with a rig and options to register by; its threads are those of the whole run.
     part_frames: of a video, that a run that is killed can lose at most. inputs: (name, text)
-    of all that the frames were opened with; an output of others is refused. codecs: has
-    write_image(file, image), encoder_name(), Encoder(part, target, first, rate) and
-    join(parts, target, rate, check). progress(registration) is called in this thread after
-    frames, and a few times a second. hold_interrupts: in the main thread, SIGINT and SIGTERM
-    end the run between two frames, by KeyboardInterrupt.
+    of all that the frames were opened with; an output of others is refused. other_reads:
+    files that were read besides those of the frames; nothing that is read is written to.
+    codecs: has encode_image(file, image), which returns bytes, encoder_name(), Encoder(file,
+    target, first, rate) and join(parts, file, target, rate, check). progress(registration) is
+    called in this thread after frames, and a few times a second. hold_interrupts: in the main
+    thread, SIGINT and SIGTERM end the run between two frames, by KeyboardInterrupt.
     """

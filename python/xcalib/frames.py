@@ -11,7 +11,6 @@ Nothing half-written: a file appears under its name only when it is complete.
 from __future__ import annotations
 
 import contextlib
-import tempfile
 import threading
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
@@ -21,16 +20,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
 from ._core import (
     DecodeError,
     InputError,
     Rig,
+    as_stored,
+    check_file_writable,
+    check_folder_writable,
+    check_output_writable,
     display_gray,
-    natural_order,
     overlay,
     pair_files,
 )
-from .whole_file import WholeFile
 
 Image = NDArray[Any]
 Size = tuple[int, int]
@@ -45,8 +47,10 @@ __all__ = [
     "as_image",
     "check_file_writable",
     "check_folder_writable",
+    "check_output_writable",
     "decode",
     "display_gray",
+    "encode_image",
     "fit_rig",
     "gray",
     "is_truncated",
@@ -69,20 +73,7 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
 def list_files(folder: str | Path, suffixes: Collection[str] = IMAGE_SUFFIXES) -> list[Path]:
     """Files of ``folder`` with one of ``suffixes`` (any case), in natural order, at least one."""
-    folder = Path(folder)
-    kinds = ", ".join(suffix.lstrip(".") for suffix in suffixes)
-    if not folder.exists():
-        raise InputError(f"{folder}: no such folder")
-    if not folder.is_dir():
-        raise InputError(f"{folder} is a file, expected a folder of {kinds} files")
-    paths = [
-        path
-        for path in folder.iterdir()
-        if path.suffix.lower() in suffixes and not path.name.startswith(".") and path.is_file()
-    ]
-    if not paths:
-        raise InputError(f"{folder}: empty, expected {kinds} files in it")
-    return [paths[index] for index in natural_order([path.name for path in paths])]
+    return _core.list_files(folder, list(suffixes))
 
 
 def pair(first: Sequence[Path], second: Sequence[Path]) -> list[tuple[Path, Path]]:
@@ -145,10 +136,15 @@ def decode(path: Path) -> Image:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     data = path.read_bytes()
+    if data.startswith((b"II*\0", b"MM\0*")):
+        data = as_stored(data)
     image = None
     with quiet_opencv(), contextlib.suppress(cv2.error):
         if data and not is_truncated(data):
             image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    kind = _core.tiff_pixel_type(data) if image is None else ""
+    if kind not in ("", "uint8", "uint16", "float32"):
+        raise InputError(f"{path}: pixels are {kind}, expected uint8, uint16 or float32")
     if image is None:
         raise DecodeError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
     return image
@@ -201,47 +197,20 @@ def gray(image: Image) -> NDArray[np.float32]:
 # -- Writing -------------------------------------------------------------------------------------
 
 
-def check_folder_writable(folder: str | Path) -> None:
-    """Raise `InputError` now, before long work, if nothing can be written below ``folder``.
-
-    The folder need not exist, and is not made.
-    """
-    folder = Path(folder)
-    base = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
-    if not base.is_dir():
-        raise InputError(f"cannot write to {folder}: {base} is a file, expected a folder")
-    try:
-        # Only an attempt shows it: access rights do not reveal read-only and special file systems.
-        with tempfile.TemporaryFile(dir=base):
-            pass
-    except OSError as error:
-        raise InputError(f"cannot write to {folder}: {base}: {error.strerror}") from None
-
-
-def check_file_writable(path: str | Path) -> None:
-    """Raise `InputError` now, before long work, if the file ``path`` cannot be written."""
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"cannot write {path}: it is a folder, expected a file name")
-    check_folder_writable(path.parent)
-
-
 def write_bytes(path: str | Path, data: bytes) -> None:
-    """Write a file whole or not at all, and make its folder."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with WholeFile(path) as partial:
-            partial.write_bytes(data)
-    except OSError as error:
-        # A full disk names no file, and the user does not know the partial one.
-        raise OSError(error.errno, error.strerror, str(path)) from None
+    """Write a file whole or not at all, see `_core.write_file`."""
+    _core.write_file(path, data)
 
 
-def write_image(path: str | Path, image: Image) -> None:
-    """Encode an image by the suffix of ``path`` and write it whole or not at all."""
+def encode_image(path: str | Path, image: Image) -> bytes:
+    """An image file of the kind that the suffix of ``path`` says."""
     path = Path(path)
     done, data = cv2.imencode(path.suffix, image)
     if not done:
         raise ValueError(f"{path}: cannot encode {image.shape} {image.dtype}")
-    write_bytes(path, data.tobytes())
+    return data.tobytes()
+
+
+def write_image(path: str | Path, image: Image) -> None:
+    """Encode an image by the suffix of ``path`` and write it whole or not at all."""
+    write_bytes(path, encode_image(path, image))

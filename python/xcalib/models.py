@@ -10,6 +10,7 @@ from __future__ import annotations
 import http.client
 import json
 import os
+import shutil
 import urllib.error
 import urllib.request
 from collections.abc import Callable
@@ -17,14 +18,29 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+from ._core import keep_file, read_text
 from .cache import file_hash
 from .depth.recipes import RECIPES
 from .frames import InputError, write_bytes
-from .whole_file import WholeFile
 
 CHUNK = 1 << 20
 TIMEOUT = 30
 """Without a byte for this long a transfer has failed [s]."""
+LARGEST = 16 << 30
+"""No model file is larger; a server that goes on sending is cut off here [bytes]."""
+
+
+class Redirects(urllib.request.HTTPRedirectHandler):
+    """Follows a server to other addresses of http(s) only, and never from https to http."""
+
+    def redirect_request(
+        self, req: urllib.request.Request, fp: Any, code: int, msg: str, headers: Any, newurl: str
+    ) -> urllib.request.Request | None:
+        """The request to the new address."""
+        scheme = urlsplit(newurl).scheme
+        if scheme not in ("http", "https") or (req.type == "https" and scheme != "https"):
+            raise urllib.error.URLError(f"it leads to another scheme, {scheme}")
+        return super().redirect_request(req, fp, code, msg, headers, newurl)
 
 
 def model_folder() -> Path:
@@ -42,13 +58,13 @@ def read_index(folder: Path) -> dict[str, dict[str, Any]]:
     if not path.exists():
         return {}
     try:
-        index = json.loads(path.read_text(encoding="utf-8"))
+        index = json.loads(read_text(path))
         files = index["files"]
         good = index["format"] == "xcalib-models" and all(
             isinstance(files[name]["url"], str) and isinstance(files[name]["sha256"], str)
             for name in files
         )
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         good = False
     if not good:
         raise InputError(f"{path}: not an index of models (format xcalib-models)")
@@ -90,6 +106,11 @@ def fetch(
         )
     parts = urlsplit(url)
     plain = url.isascii() and url.isprintable() and " " not in url  # as urllib wants it
+    if "@" in parts.netloc:
+        raise InputError(
+            f"the address at {parts.netloc.rpartition('@')[2]} has a name or a password in it,"
+            " which would be printed and kept; expected one without"
+        )
     if parts.scheme not in ("http", "https") or not parts.netloc or not plain:
         known = ", ".join(RECIPES)
         raise InputError(f"{url!r} is neither an http(s) address nor one of {known}")
@@ -112,19 +133,21 @@ def fetch(
 
     folder.mkdir(parents=True, exist_ok=True)
     # Not discarded where the transfer fails: the next one resumes it.
-    file = WholeFile(path, folder / f".{name}.partial")
-    partial = file.partial
+    partial = folder / f".{name}.partial"
     _transfer(url, partial, show)
+    if not partial.stat().st_size:
+        partial.unlink()
+        raise RuntimeError(f"{url}: the server sent an empty file")
     found = file_hash(partial)
     if known_hash is not None and found != known_hash:
-        file.discard()
+        partial.unlink()
         raise InputError(
             f"{url}: sha256 is {found}, expected {known_hash} as when it was first fetched"
         )
     index[name] = {"url": url, "sha256": found, "bytes": partial.stat().st_size}
     document = {"format": "xcalib-models", "version": 1, "files": index}
     write_bytes(folder / "index.json", (json.dumps(document, indent=2) + "\n").encode())
-    file.keep()
+    keep_file(partial, path)
     return path
 
 
@@ -150,6 +173,24 @@ def _check(path: Path, expected: str) -> None:
         )
 
 
+def _continues(content_range: str, have: int) -> bool:
+    """Whether a part of a file begins where what came before ends."""
+    return content_range.replace("bytes ", "", 1).startswith(f"{have}-")
+
+
+def _check_room(url: str, total: int, partial: Path) -> None:
+    free = shutil.disk_usage(partial.parent).free
+    if total > min(LARGEST, free):
+        raise InputError(
+            f"{url}: {total} bytes, expected at most {LARGEST}, and what the disk has free: {free}"
+        )
+
+
+def _without_links(name: str, flags: int) -> int:
+    """Open a file that may not be a link to another."""
+    return os.open(name, flags | os.O_NOFOLLOW, 0o666)
+
+
 def _transfer(url: str, partial: Path, show: Callable[[int, int | None], None] | None) -> None:
     """Append to ``partial`` what it lacks, or start over where the server has another file now."""
     tag = partial.with_name(f"{partial.name}.etag")
@@ -160,22 +201,27 @@ def _transfer(url: str, partial: Path, show: Callable[[int, int | None], None] |
         request.add_header("Range", f"bytes={have}-")
         request.add_header("If-Range", tag.read_text(encoding="utf-8"))
     try:
-        with urllib.request.urlopen(request, timeout=TIMEOUT) as response:
+        with urllib.request.build_opener(Redirects).open(request, timeout=TIMEOUT) as response:
             if response.status != 206:
                 have = 0
-            length = response.headers.get("Content-Length")
-            total = have + int(length) if length else None
+            elif not _continues(response.headers.get("Content-Range", ""), have):
+                partial.unlink()
+                raise RuntimeError(f"{url}: cannot be resumed, fetch it again")
+            length = response.headers.get("Content-Length", "")
+            total = have + int(length) if length.isdecimal() else None
+            _check_room(url, total or 0, partial)
             mode = "ab" if have else "wb"
             # Only a strong tag promises the same bytes.
             etag = response.headers.get("ETag", "")
+            tag.unlink(missing_ok=True)
             if etag and not etag.startswith("W/"):
                 write_bytes(tag, etag.encode())
-            else:
-                tag.unlink(missing_ok=True)
-            with partial.open(mode) as file:
+            with open(partial, mode, opener=_without_links) as file:
                 while chunk := response.read1(CHUNK):
                     file.write(chunk)
                     have += len(chunk)
+                    if have > LARGEST:
+                        raise InputError(f"{url}: more than {LARGEST} bytes, expected a model file")
                     if show:
                         show(have, total)
     except urllib.error.HTTPError as error:

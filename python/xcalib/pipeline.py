@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,16 +18,22 @@ from ._core import (
     CalibrationResult,
     Choice,
     Rig,
+    TimeOffset,
+    add_lags,
     calibrate,
     draw_frames,
+    frames_later,
     frames_to_judge_plane,
     load_frames,
+    look_at_lags,
+    orientation_line,
     with_file_name,
 )
 from .choose import choose_informed
 from .depth import DepthProvider, FolderDepth, PlaneDepth
 from .flow import FlowProvider
-from .footage import Stream, TopicDepth, open_matched_depth, open_pairs
+from .footage import Picked, Stream, TopicDepth, open_matched_depth, open_pairs
+from .footage.bag import clock_line
 from .footage.opening import PickedDepth
 from .frames import DecodeError, Image, InputError, fit_rig, size_of
 from .inputs import Inputs
@@ -52,6 +59,12 @@ class Frames:
     depth: DepthProvider
     notes: tuple[str, ...] = ()
     """What the pairing by time found, a line each."""
+    all_sources: Stream | None = None
+    """With those that have no partner; None: not known, `look_at_lags` sees nothing."""
+    partners: tuple[int, ...] = ()
+    """Of the references, in all sources."""
+    offset: TimeOffset | None = None
+    """That they were paired with."""
 
     @staticmethod
     def open(inputs: Inputs, rig: Rig | None = None) -> Frames:
@@ -78,9 +91,21 @@ class Frames:
         if rig is not None:
             pairs.refine(rig, open_depth)
         depth = open_depth(pairs.pairing.references.tolist())
+        streams = pairs.all_references, pairs.all_sources
+        applied = inputs.matching.exif_orientation == "apply"
+        opened = [orientation_line(stream, applied) for stream in streams] + [clock_line(*streams)]
         note = misfit(depth, rig) if rig is not None else ""
-        notes = (*pairs.notes, note) if note else tuple(pairs.notes)
-        return Frames(pairs.references, pairs.sources, depth, notes)
+        notes = tuple(line for line in (*opened, *pairs.notes, note) if line)
+        partners = tuple(pairs.pairing.sources.tolist())
+        return Frames(
+            pairs.references,
+            pairs.sources,
+            depth,
+            notes,
+            pairs.all_sources,
+            partners,
+            pairs.offset,
+        )
 
     def __len__(self) -> int:
         return len(self.references)
@@ -97,8 +122,28 @@ class Frames:
 
     def with_scalar_sources(self, colormap: str) -> tuple[Frames, str]:
         """The frames with false-colour sources turned back to numbers, and a line on it or ''."""
-        sources, line = scalar_sources(self.sources, colormap)
-        return replace(self, sources=sources), line
+        if self.all_sources is None:
+            sources, line = scalar_sources(self.sources, colormap)
+            return replace(self, sources=sources), line
+        every, line = scalar_sources(self.all_sources, colormap)
+        if every is self.all_sources:
+            return self, line
+        return replace(self, sources=Picked(every, self.partners), all_sources=every), line
+
+    def with_lag(self, lag: int, chosen: Sequence[int]) -> tuple[Frames, list[int]]:
+        """The frames with the sources ``lag`` frames later, without those that have none, and the
+        indices of the ``chosen`` references in them.
+        """
+        assert self.all_sources is not None
+        kept, partners = frames_later(self.all_sources, self.partners, lag)
+        later = replace(
+            self,
+            references=Picked(self.references, kept),
+            sources=Picked(self.all_sources, partners),
+            depth=PickedDepth(self.depth, kept),
+            partners=tuple(partners),
+        )
+        return later, [kept.index(index) for index in chosen if index in kept]
 
     def fit(self, rig: Rig) -> Rig:
         """The rig at the size of these frames, read from the first one."""
@@ -146,6 +191,9 @@ def run_calibration(
     ``chosen`` the frames are spread over the footage by the seed. Frames that cannot be decoded
     are left out, and ``warn`` is called with their number; if none is left, `InputError` names the
     first. ``flow`` is a provider for the flow term, None the built-in one.
+
+    Where the footage is a sequence, the fits with the sources some frames earlier and later are
+    looked at; the result is not to be trusted if one of them is better (``report.lag``).
     """
     if chosen is None:
         chosen = draw_frames(len(frames), calibration.max_frames, calibration.seed)
@@ -165,6 +213,23 @@ def run_calibration(
     if initial is not None:
         initial = fit_rig(initial, size_of(references[0]), size_of(sources[0]))
 
+    with stages_bar(quiet) as show:
+        try:
+            result = calibrate(references, sources, depths, initial, calibration, show, flow)
+        except ValueError as error:
+            raise InputError(with_file_name(str(error), frames.references, chosen)) from None
+        if frames.all_sources is not None and frames.offset is not None:
+            lag = look_at_lags(
+                *(references, sources, depths, [frames.partners[index] for index in chosen]),
+                *(frames.all_sources, result.rig, calibration, lambda share: show("lags", share)),
+            )
+            add_lags(result, lag, frames.offset, frames.all_sources)
+    return result, chosen
+
+
+@contextlib.contextmanager
+def stages_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """A function that shows a stage and the share of it that is done, on stderr."""
     with tqdm(
         total=1.0,
         bar_format="{desc} {percentage:3.0f}%|{bar}| {elapsed}",
@@ -176,11 +241,7 @@ def run_calibration(
             bar.set_description_str(stage, refresh=False)
             bar.update(fraction - bar.n)
 
-        try:
-            result = calibrate(references, sources, depths, initial, calibration, show, flow)
-        except ValueError as error:
-            raise InputError(with_file_name(str(error), frames.references, chosen)) from None
-    return result, chosen
+        yield show
 
 
 def _readable(stream: Stream, chosen: Sequence[int]) -> Iterator[Image]:

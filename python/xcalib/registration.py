@@ -8,14 +8,22 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
-from ._core import Registrar, Registration, Rig, absolute_path, fingerprint, register_frames
+from ._core import (
+    Registrar,
+    Registration,
+    Rig,
+    absolute_path,
+    fingerprint,
+    read_file,
+    register_frames,
+)
 from .footage import encoder
 from .pipeline import Frames
 
@@ -49,6 +57,7 @@ def run_registration(
     options: RegistrationOptions | None = None,
     inputs: Mapping[str, Any] | None = None,
     quiet: bool = False,
+    other_reads: Sequence[Path] = (),
 ) -> Registration:
     """Register frames and write images, masks and, if asked for, overlays.
 
@@ -58,6 +67,8 @@ def run_registration(
         A folder, or a video by its suffix, at the rate of the reference.
     inputs
         All that the caller made ``frames`` with, by name: an output of other inputs is refused.
+    other_reads
+        Files that were read besides those of the frames: nothing that is read is written to.
 
     Raises
     ------
@@ -78,6 +89,7 @@ def run_registration(
             options.overwrite,
             PART_FRAMES,
             described(inputs or {}),
+            list(other_reads),
             encoder,
             progress,
             threading.current_thread() is threading.main_thread(),
@@ -91,7 +103,7 @@ def described(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:
         path = isinstance(value, Path) or (name == "depth_spec" and value != "plane")
         line = str(absolute_path(value) if path else value)
         if path and Path(value).is_file() and name not in ("reference", "source", "depth_spec"):
-            line += f" ({fingerprint(Path(value).read_bytes())})"
+            line += f" ({fingerprint(read_file(value))})"
         text.append((name, line))
     return text
 

@@ -8,7 +8,22 @@ from typing import Any
 
 import yaml
 
-from .frames import InputError
+from ._core import InputError, read_text
+
+DEEPEST = 16
+"""Lists and mappings within each other."""
+
+
+def check_depth(text: str, path: Path) -> None:
+    """Refuse what is nested so deep that building it would exhaust the stack, and aliases."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise InputError(f"{path}: nested more than {DEEPEST} deep")
+        if isinstance(event, yaml.AliasEvent):
+            raise InputError(f"{path}: an alias (*), expected values only")
 
 
 def load_yaml(
@@ -16,9 +31,13 @@ def load_yaml(
 ) -> dict[str, Any]:
     """The mapping in a YAML file, with all of the required keys and none unknown."""
     names = ", ".join([*required, *optional])
+    text = read_text(path)
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        check_depth(text, path)
+        document = yaml.safe_load(text)
+    except InputError:
+        raise
+    except (yaml.YAMLError, ValueError) as error:
         raise InputError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
     if not isinstance(document, dict):
         raise InputError(f"{path}: expected keys and values, one a line: {names}")

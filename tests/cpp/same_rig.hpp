@@ -15,6 +15,10 @@ inline void expect_same(const Pinhole& a, const Pinhole& b, double tolerance) {
     EXPECT_NEAR(a.cx, b.cx, tolerance);
     EXPECT_NEAR(a.cy, b.cy, tolerance);
     EXPECT_NEAR(a.skew, b.skew, tolerance);
+    EXPECT_EQ(a.lens.model(), b.lens.model());
+    ASSERT_EQ(a.lens.coefficients().size(), b.lens.coefficients().size());
+    for (std::size_t i = 0; i < a.lens.coefficients().size(); ++i)
+        EXPECT_NEAR(a.lens.coefficients()[i], b.lens.coefficients()[i], tolerance);
 }
 
 inline void expect_same(const Rig& a, const Rig& b, double tolerance) {

@@ -37,6 +37,24 @@ inline Rig turned(const Rig& rig, const Eigen::Vector3d& w) {
     return out;
 }
 
+// Of any model, bending as real ones do; the images of random_rig lie within what they show.
+inline Lens random_lens(std::mt19937& random) {
+    const auto about = [&](double size) { return uniform(random, -size, size); };
+    switch (random() % 4) {
+        case 0:
+            return {LensModel::brown,
+                    {uniform(random, -0.4, 0.1), 0.1, about(0.005), about(0.005)}};
+        case 1:
+            return {LensModel::brown,
+                    {uniform(random, -0.4, 0.1), 0.1, about(0.005), about(0.005), about(0.02)}};
+        case 2:
+            return {LensModel::brown,
+                    {about(0.3), about(0.1), about(0.005), about(0.005), about(0.02),
+                     uniform(random, 0, 0.3), about(0.05), about(0.01)}};
+        default: return {LensModel::fisheye, {about(0.05), about(0.02), about(0.01), about(0.005)}};
+    }
+}
+
 // Cameras that differ in everything, skew included; the source sees about what the reference sees.
 inline Rig random_rig(std::mt19937& random, int width, int height, int source_width,
                       int source_height) {
@@ -55,6 +73,16 @@ inline Rig random_rig(std::mt19937& random, int width, int height, int source_wi
                                              uniform(random, -0.1, 0.1)};
     return turned(rig, {uniform(random, -0.05, 0.05), uniform(random, -0.05, 0.05),
                         uniform(random, -0.05, 0.05)});
+}
+
+// The same with a lens on the source, the reference or both, as `i` counts, and every second one
+// mirrored.
+inline Rig random_bent_rig(std::mt19937& random, int i, int width, int height, int source_width,
+                           int source_height) {
+    Rig rig = random_rig(random, width, height, source_width, source_height);
+    if (i % 3 != 0) rig.source.lens = random_lens(random);
+    if (i % 3 != 1) rig.reference.lens = random_lens(random);
+    return i % 2 ? with_flipped_source(rig) : rig;
 }
 
 // Eq. (3d_mapping) step by step, in double: unproject, move, project.
@@ -184,11 +212,11 @@ inline Rig moved(const Rig& rig, int parameter, double step) {
                                   &camera.center[1], &camera.skew_share[0]};
         *fields[which] += step;
     };
-    if (parameter >= kReferenceLogFx) in_camera(p.reference, parameter - kReferenceLogFx);
+    if (parameter >= kSourceK1) p.source_lens[parameter - kSourceK1] += step;
+    else if (parameter >= kReferenceLogFx) in_camera(p.reference, parameter - kReferenceLogFx);
     else if (parameter >= kTranslationX) p.translation[parameter - kTranslationX] += step;
     else in_camera(p.source, parameter - kSourceLogFx);
-    return rig_from_solver(p, rig.reference.width, rig.reference.height, rig.source.width,
-                           rig.source.height);
+    return rig_from_solver(p, rig);
 }
 
 // The farthest that any pixel of the reference moves by a unit of the parameter [px of the source].
@@ -217,6 +245,7 @@ inline constexpr ParameterClass kParameterClasses[] = {
     {"reference focal lengths", kReferenceLogFx, 2},
     {"reference principal point", kReferenceCx, 2},
     {"reference skew", kReferenceSkew, 1},
+    {"source lens", kSourceK1, 2},
 };
 
 }  // namespace xcalib::testing

@@ -72,18 +72,18 @@ class PlainDepth : public Depth {
 // An image is its first value; a video is that of each frame, a line each.
 class TextCodecs : public Codecs {
    public:
-    void write_image(const std::filesystem::path& file, const Picture& image) override {
+    std::string encode_image(const std::filesystem::path& file, const Picture& image) override {
         meet(file.filename().string());
-        write_file(file, line_of(image));
+        return line_of(image);
     }
     std::string encoder_name() override { return "text"; }
-    std::unique_ptr<PartWriter> open_part(const std::filesystem::path& part,
-                                          const std::filesystem::path&, const Picture&,
+    std::unique_ptr<PartWriter> open_part(const std::filesystem::path& file,
+                                          const std::filesystem::path& target, const Picture&,
                                           double) override {
-        return std::make_unique<Part>(part, *this);
+        return std::make_unique<Part>(file, target, *this);
     }
     void join(const std::vector<std::pair<std::filesystem::path, int>>& parts,
-              const std::filesystem::path& target, double,
+              const std::filesystem::path& file, const std::filesystem::path& target, double,
               const std::function<void()>& check) override {
         std::string all;
         for (const auto& [part, count] : parts) {
@@ -95,7 +95,7 @@ class TextCodecs : public Codecs {
             }
         }
         meet(target.filename().string());
-        write_file(target, all);
+        write_text(file, all);
     }
 
     // Called with the name of each file to be written, and of a part for each of its frames.
@@ -108,22 +108,17 @@ class TextCodecs : public Codecs {
 
     class Part : public PartWriter {
        public:
-        Part(std::filesystem::path path, const TextCodecs& codecs)
-            : path_(std::move(path)), codecs_(codecs), out_(partial()) {}
-        ~Part() override { std::filesystem::remove(partial()); }
+        Part(const std::filesystem::path& file, const std::filesystem::path& target,
+             const TextCodecs& codecs)
+            : name_(target.filename().string()), codecs_(codecs), out_(file) {}
         void write(const Picture& image) override {
-            codecs_.meet(path_.filename().string());
+            codecs_.meet(name_);
             out_ << line_of(image);
         }
-        void close(int) override {
-            out_.close();
-            std::filesystem::rename(partial(), path_);
-        }
+        void close(int) override { out_.close(); }
 
        private:
-        std::filesystem::path partial() const { return path_.string() + ".partial"; }
-
-        std::filesystem::path path_;
+        std::string name_;
         const TextCodecs& codecs_;
         std::ofstream out_;
     };

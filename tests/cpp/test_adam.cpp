@@ -30,13 +30,11 @@ Eigen::Vector3d turn(const Rig& a, const Rig& b) {
 
 TEST(Adam, JacobianAgreesWithCentralDifferences) {
     std::mt19937 random(2);
-    const Rig sizes = random_rig(random, kWidth, kHeight, 180, 144);
-    PaperVector x = vector_of(paper_from_rig(sizes));
+    const Rig rest = random_rig(random, kWidth, kHeight, 180, 144);
+    PaperVector x = vector_of(paper_from_rig(rest));
     x.segment<4>(kPaperQuaternion) *= 1.7;  // any norm will do
-    const auto rig_at = [&](const PaperVector& at) {
-        return rig_from_paper(paper_of(at), kWidth, kHeight, 180, 144);
-    };
-    const auto jacobian = paper_jacobian(paper_of(x), sizes);
+    const auto rig_at = [&](const PaperVector& at) { return rig_from_paper(paper_of(at), rest); };
+    const auto jacobian = paper_jacobian(paper_of(x), rest);
     for (int v = 0; v < kNumPaperVariables; ++v) {
         constexpr double kStep = 1e-5;
         PaperVector up = x, down = x;
@@ -44,6 +42,7 @@ TEST(Adam, JacobianAgreesWithCentralDifferences) {
         down[v] -= kStep;
         const SolverParameters a = solver_from_rig(rig_at(down)), b = solver_from_rig(rig_at(up));
         Eigen::Matrix<double, kNumParameters, 1> change;
+        for (int i = 0; i < 2; ++i) change[kSourceK1 + i] = b.source_lens[i] - a.source_lens[i];
         const auto camera = [&](int row, const SolverParameters::Camera& from,
                                 const SolverParameters::Camera& to) {
             change.segment<5>(row) << to.log_f[0] - from.log_f[0], to.log_f[1] - from.log_f[1],

@@ -19,8 +19,8 @@ using ::xcalib::testing::has;
 constexpr int kWidth = 61, kHeight = 40, kSourceWidth = 50, kSourceHeight = 32;
 
 xcalib_rig some_rig() {
-    return {{kWidth, kHeight, 55, 56, 30.2, 19.8, 0.1},
-            {kSourceWidth, kSourceHeight, 45, 44, 24.4, 15.3, -0.2},
+    return {{kWidth, kHeight, 55, 56, 30.2, 19.8, 0.1, XCALIB_LENS_BROWN, {-0.1, 0.02, 0.001}},
+            {kSourceWidth, kSourceHeight, 45, 44, 24.4, 15.3, -0.2, XCALIB_LENS_FISHEYE, {0.01}},
             {0.9998000066665778, 0.0, 0.019998666693333084, 0.0},
             {-0.13, 0.01, 0.02},
             0,
@@ -31,7 +31,10 @@ xcalib_rig some_rig() {
 Rig the_same_rig() {
     const xcalib_rig r = some_rig();
     const auto camera = [](const xcalib_camera& c) {
-        return Pinhole{c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.skew};
+        const double* k = c.lens_coefficients;
+        const Lens lens = c.lens == XCALIB_LENS_BROWN ? Lens(LensModel::brown, {k, k + 8})
+                                                      : Lens(LensModel::fisheye, {k, k + 4});
+        return Pinhole{c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.skew, lens};
     };
     const double* q = r.quaternion_wxyz;
     const double* t = r.translation_m;
@@ -167,6 +170,21 @@ TEST(CApi, RefusesARigOrOptionsThatAreNotValid) {
     EXPECT_STREQ(xcalib_last_error(), "rig is NULL");
     EXPECT_EQ(xcalib_create(&rig, nullptr, nullptr), XCALIB_INVALID_ARGUMENT);
     EXPECT_STREQ(xcalib_last_error(), "registrar is NULL");
+}
+
+TEST(CApi, RefusesALensThatIsNone) {
+    const auto refused = [](int model, double coefficient) {
+        xcalib_rig rig = some_rig();
+        rig.source.lens = model;
+        rig.source.lens_coefficients[1] = coefficient;
+        xcalib_registrar* registrar = nullptr;
+        EXPECT_EQ(xcalib_create(&rig, nullptr, &registrar), XCALIB_INVALID_ARGUMENT);
+        EXPECT_EQ(registrar, nullptr);
+        return std::string(xcalib_last_error());
+    };
+    EXPECT_EQ(refused(3, 0), "source: lens is 3, expected an xcalib_lens_model");
+    EXPECT_EQ(refused(XCALIB_LENS_BROWN, INFINITY),
+              "source: lens k2 = inf, expected a finite number");
 }
 
 TEST(CApi, RefusesImagesThatDoNotFit) {

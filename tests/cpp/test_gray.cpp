@@ -240,6 +240,30 @@ TEST(ResizeArea, FollowsTheConventionOfTheCameras) {
     }
 }
 
+TEST(KnownGray, FillsWhatIsNotFiniteFromAround) {
+    Image slope(20, 10);
+    for (int y = 0; y < 10; ++y)
+        for (int x = 0; x < 20; ++x) slope.row(y)[x] = static_cast<float>(x);
+    EXPECT_EQ(known_gray(slope.view()).pixels, slope.pixels);
+    Image holed = slope;
+    for (const auto& [x, y] : {std::pair{5, 5}, {6, 5}, {7, 5}, {0, 0}, {19, 9}})
+        holed.row(y)[x] = x == 6 ? kInfinity : kNaN;
+    const Image filled = known_gray(holed.view());
+    for (int y = 0; y < 10; ++y)
+        for (int x = 0; x < 20; ++x) EXPECT_NEAR(filled.row(y)[x], x, 1.0) << x << ", " << y;
+    // All of a hole, however large.
+    Image left(20, 10, 2.0f);
+    for (int y = 0; y < 10; ++y) std::fill_n(left.row(y) + 10, 10, kNaN);
+    EXPECT_EQ(known_gray(left.view()).pixels, Image(20, 10, 2.0f).pixels);
+}
+
+TEST(KnownGray, RefusesWhatIsHardlyKnown) {
+    Image image(4, 4, 1.0f);
+    std::fill_n(image.pixels.begin(), 9, kNaN);
+    EXPECT_EQ(refusal([&] { known_gray(image.view()); }),
+              "image has 9 of 16 pixels that are not finite, expected at most half of them");
+}
+
 TEST(GaussianBlur, SpreadsAPointByItsSigmaAndKeepsTheSum) {
     Image image(41, 41);
     image.row(20)[20] = 1.0f;

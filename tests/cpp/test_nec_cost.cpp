@@ -105,7 +105,7 @@ TEST(Compress, KeepsTheEquationsOfARealPair) {
 // --- The cost as Ceres sees it
 // --------------------------------------------------------------------
 
-constexpr int kBlockSizes[] = {2, 2, 1, 4, 3, 2, 2, 1};
+constexpr int kBlockSizes[] = {2, 2, 1, 4, 3, 2, 2, 1, 2};
 
 struct Scene {
     Rig truth, rig;
@@ -277,7 +277,7 @@ TEST(NecCost, BlocksThatAreNotAskedForMayBeLeftOut) {
     ASSERT_TRUE(cost.Evaluate(blocks.data(), residuals.data(), all.data()));
     const std::vector<double> rotation = storage[3];
     std::vector<double> again(rotation.size(), 7.0);
-    some.assign(8, nullptr);
+    some.assign(all.size(), nullptr);
     some[3] = again.data();
     ASSERT_TRUE(cost.Evaluate(blocks.data(), residuals.data(), some.data()));
     EXPECT_EQ(again, rotation);
@@ -295,6 +295,19 @@ Quaternion random_quaternion(std::mt19937& random) {
     for (int i = 0; i < 4; ++i) q[i] = uniform(random, -1, 1);
     q.normalize();
     return {q[0], q[1], q[2], q[3]};
+}
+
+TEST(TogetherManifold, MovesBothAndBack) {
+    const TogetherManifold manifold;
+    const double from[2] = {0.25, -1.5}, delta[1] = {0.125};
+    double to[2], back[1], plus[2], minus[2];
+    ASSERT_TRUE(manifold.Plus(from, delta, to));
+    EXPECT_EQ(to[0], 0.375);
+    EXPECT_EQ(to[1], -1.375);
+    ASSERT_TRUE(manifold.Minus(to, from, back));
+    EXPECT_EQ(back[0], delta[0]);
+    ASSERT_TRUE(manifold.PlusJacobian(from, plus) && manifold.MinusJacobian(from, minus));
+    EXPECT_EQ(plus[0] * minus[0] + plus[1] * minus[1], 1) << "one undoes the other";
 }
 
 TEST(PanTiltManifold, PlusTurnsAboutAnAxisInTheSourcesImagePlane) {

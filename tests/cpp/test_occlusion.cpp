@@ -96,14 +96,23 @@ TEST(Occlusion, IsWhatTheRaysSay) {
         Eigen::Vector3d position;
         int width, height;
         double hfov;
+        Lens source_lens = {}, reference_lens = {};
     };
+    const Lens barrel(LensModel::brown, {-0.3, 0.1, 0.002, 0.001});
+    const Lens fisheye(LensModel::fisheye, {0.02, 0, 0, 0});
     for (const Case& c : {Case{"right", {0.3, 0.01, 0.02}, 320, 256, 0.85},
                           Case{"left", {-0.3, 0, -0.03}, 640, 512, 0.9},
                           Case{"above", {0.01, -0.3, 0}, 320, 256, 0.85},
                           Case{"below, finer", {0, 0.25, 0.02}, 1280, 1024, 0.9},
                           Case{"aslant", {-0.25, 0.25, 0.05}, 480, 384, 0.95},
-                          Case{"narrow", {0.3, 0.02, 0}, 640, 512, 0.45}}) {
-        const Rig rig = rig_at(c.position, c.width, c.height, c.hfov);
+                          Case{"narrow", {0.3, 0.02, 0}, 640, 512, 0.45},
+                          Case{"source lens", {0.3, 0.01, 0}, 640, 512, 0.95, barrel},
+                          Case{"source fisheye", {-0.3, 0.01, 0}, 320, 256, 0.95, fisheye},
+                          Case{"reference lens", {0.3, 0, 0}, 640, 512, 0.95, {}, barrel},
+                          Case{"both", {0.2, 0.2, 0}, 480, 384, 0.95, barrel, fisheye}}) {
+        Rig rig = rig_at(c.position, c.width, c.height, c.hfov);
+        rig.source.lens = c.source_lens;
+        rig.reference.lens = c.reference_lens;
         const Rendered scene = rendered(rig);
         const Image source(c.width, c.height, 1.0f);
         const Registered all =
@@ -184,8 +193,7 @@ TEST(Occlusion, CamerasAtOnePlaceSeeTheSame) {
     for (const std::uint8_t code : out.mask) ASSERT_NE(code, kOccluded);
 }
 
-TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
-    const Rig rig = rig_at({0.3, 0.02, 0.05}, 320, 256, 0.85);
+void expect_the_same_on_every_path(const Rig& rig) {
     const Rendered scene = rendered(rig);
     std::mt19937 random(1);
     Image source(320, 256);
@@ -205,6 +213,13 @@ TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
         for (std::size_t i = 0; i < out.mask.size(); ++i) differ += out.mask[i] != expected.mask[i];
         EXPECT_LT(differ, kWidth * kHeight / 1000);
     });
+}
+
+TEST(Occlusion, IsTheSameOnEveryPathAndWithAnyNumberOfThreads) {
+    Rig rig = rig_at({0.3, 0.02, 0.05}, 320, 256, 0.85);
+    expect_the_same_on_every_path(rig);
+    rig.source.lens = Lens(LensModel::brown, {-0.3, 0.1, 0.002, 0.001});
+    expect_the_same_on_every_path(rig);
 }
 
 TEST(Occlusion, GapsBetweenTheCellsOfASurfaceAreFilled) {

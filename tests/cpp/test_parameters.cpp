@@ -15,9 +15,10 @@ using ::xcalib::testing::random_rig;
 constexpr double kPi = 3.14159265358979323846;
 
 const Pinhole kCamera{640, 480, 500, 400, 320, 240, 10};
+const Rig kRest{Pinhole::from_hfov(640, 480, 1), Pinhole::from_hfov(320, 256, 1), {}};
 
 TEST(PaperParameters, StartAt45DegreesSquarePixelsAndTheImageCentre) {
-    const Rig rig = rig_from_paper(PaperParameters{}, 640, 480, 320, 256);
+    const Rig rig = rig_from_paper(PaperParameters{}, kRest);
     for (const Pinhole& camera : {rig.reference, rig.source}) {
         EXPECT_NEAR(camera.hfov(), kPi / 4, 1e-14);
         EXPECT_NEAR(camera.fy, camera.fx, 1e-10);
@@ -33,7 +34,7 @@ TEST(PaperParameters, FocalParametersScaleTheAngleOfView) {
     PaperParameters parameters;
     parameters.source.fx = 2;  // twice 45 deg
     parameters.source.fy = 0.5;
-    const Rig rig = rig_from_paper(parameters, 640, 480, 320, 256);
+    const Rig rig = rig_from_paper(parameters, kRest);
     EXPECT_NEAR(rig.source.hfov(), kPi / 2, 1e-14);
     EXPECT_NEAR(rig.source.vfov(), std::atan(256.0 / 320 * std::tan(kPi / 8)), 1e-14);
     EXPECT_NEAR(rig.reference.hfov(), kPi / 4, 1e-14);
@@ -44,7 +45,7 @@ TEST(PaperParameters, CoarseTranslationWeighsTenTimesTheFine) {
     PaperParameters parameters;
     parameters.translation.col(0) = Eigen::Vector3d(1, 2, 3);
     parameters.translation.col(1) = Eigen::Vector3d(0.1, 0.2, -0.3);
-    const Rig rig = rig_from_paper(parameters, 640, 480, 320, 256);
+    const Rig rig = rig_from_paper(parameters, kRest);
     EXPECT_LT((rig.t() - Eigen::Vector3d(2, 4, 0)).norm(), 1e-14);
 }
 
@@ -54,7 +55,7 @@ TEST(PaperParameters, QuaternionsOfAnyNormAreTheSameRotation) {
     quarter_turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
     for (const double norm : {1e-3, 1.0, 7.5, -2.0}) {
         parameters.quaternion = norm * Eigen::Vector4d(1, 0, 0, 1);
-        const Rig rig = rig_from_paper(parameters, 640, 480, 320, 256);
+        const Rig rig = rig_from_paper(parameters, kRest);
         EXPECT_LT((rig.R() - quarter_turn).norm(), 1e-14);
         EXPECT_NEAR(rig.source_from_reference.rotation.norm(), 1, 1e-15);
     }
@@ -64,11 +65,11 @@ TEST(PaperParameters, ConvertBothWays) {
     std::mt19937 random(4);
     for (int i = 0; i < 50; ++i) {
         const Rig rig = random_rig(random, 640, 480, 320, 256);
-        expect_same(rig_from_paper(paper_from_rig(rig), 640, 480, 320, 256), rig, 1e-9);
+        expect_same(rig_from_paper(paper_from_rig(rig), kRest), rig, 1e-9);
 
         PaperParameters parameters = paper_from_rig(rig);
         parameters.translation.col(1) = Eigen::Vector3d(0.01, -0.02, 0.005);
-        const PaperParameters back = paper_from_rig(rig_from_paper(parameters, 640, 480, 320, 256));
+        const PaperParameters back = paper_from_rig(rig_from_paper(parameters, kRest));
         EXPECT_NEAR(back.source.fx, parameters.source.fx, 1e-12);
         EXPECT_NEAR(back.source.fy, parameters.source.fy, 1e-12);
         EXPECT_NEAR(back.reference.cx, parameters.reference.cx, 1e-12);
@@ -98,7 +99,7 @@ TEST(SolverParameters, ConvertBothWays) {
     std::mt19937 random(5);
     for (int i = 0; i < 50; ++i) {
         const Rig rig = random_rig(random, 640, 480, 320, 256);
-        expect_same(rig_from_solver(solver_from_rig(rig), 640, 480, 320, 256), rig, 1e-9);
+        expect_same(rig_from_solver(solver_from_rig(rig), kRest), rig, 1e-9);
     }
 }
 
@@ -106,16 +107,30 @@ TEST(SolverParameters, AreTheSameAtEveryPyramidLevel) {
     std::mt19937 random(6);
     const Rig rig = random_rig(random, 640, 480, 320, 256);
     const Rig small = rig.resized(80, 60, 53, 43);
-    expect_same(rig_from_solver(solver_from_rig(rig), 80, 60, 53, 43), small, 1e-10);
-    expect_same(rig_from_solver(solver_from_rig(small), 640, 480, 320, 256), rig, 1e-9);
+    expect_same(rig_from_solver(solver_from_rig(rig), kRest.resized(80, 60, 53, 43)), small, 1e-10);
+    expect_same(rig_from_solver(solver_from_rig(small), kRest), rig, 1e-9);
 }
 
 TEST(SolverParameters, AQuaternionOffTheSphereIsNormalized) {
     SolverParameters p = solver_from_rig(Rig{kCamera, kCamera, {}});
     p.quaternion[3] = 1;  // (1, 0, 0, 1): a quarter turn about z
-    const Rig rig = rig_from_solver(p, 640, 480, 640, 480);
+    const Rig rig = rig_from_solver(p, Rig{kCamera, kCamera, {}});
     EXPECT_NEAR(rig.source_from_reference.rotation.norm(), 1, 1e-15);
     EXPECT_LT((rig.R() * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-14);
+}
+
+TEST(SolverParameters, HaveK1AndK2OfALensThatIsAPolynomial) {
+    Rig rig{kCamera, kCamera, {}};
+    SolverParameters p = solver_from_rig(rig);
+    EXPECT_FALSE(rig_from_solver(p, rig).source.lens.bends()) << "what is none stays none";
+    p.source_lens[0] = -0.25;
+    p.source_lens[1] = 0.0625;
+    EXPECT_EQ(rig_from_solver(p, rig).source.lens, Lens(LensModel::brown, {-0.25, 0.0625, 0, 0}));
+    rig.source.lens = Lens(LensModel::brown, {0.1, 0.2, 0.01, 0.02, 0.3});
+    EXPECT_EQ(rig_from_solver(p, rig).source.lens,
+              Lens(LensModel::brown, {-0.25, 0.0625, 0.01, 0.02, 0.3}));
+    rig.source.lens = Lens(LensModel::fisheye, {0.1, 0.2, 0, 0});
+    EXPECT_EQ(rig_from_solver(p, rig).source.lens, rig.source.lens) << "which has other ones";
 }
 
 }  // namespace

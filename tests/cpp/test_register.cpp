@@ -278,6 +278,48 @@ TEST(Registrar, IdentityReturnsTheImage) {
     expect_identity_is_exact<float>(3);
 }
 
+// A pixel that is not finite reaches those that are made of it, and no others.
+void expect_not_finite_is_invalid(int channels, bool nearest, float value) {
+    std::mt19937 random(8);
+    Pixels<float> source = random_pixels<float>(random, kWidth, kHeight, channels);
+    const Image depth(kWidth, kHeight, 2.0f);
+    RegistrarOptions options = by(2);
+    options.nearest = nearest;
+    const Registrar registrar(shifted_rig(kWidth, kHeight, 0.25, 0.25), options);
+    const auto registered = [&](Pixels<float>& out, std::vector<std::uint8_t>& mask) {
+        registrar.register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
+    };
+    Pixels<float> before(kWidth, kHeight, channels), after = before;
+    std::vector<std::uint8_t> whole(kWidth * kHeight, 9), codes = whole;
+    registered(before, whole);
+    const int hole_x = 17, hole_y = 11;
+    source.values[static_cast<std::size_t>((hole_y * kWidth + hole_x) * channels + channels - 1)] =
+        value;
+    registered(after, codes);
+    int holes = 0;
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+            const bool near =
+                nearest ? x == hole_x && y == hole_y
+                        : (x == hole_x || x == hole_x - 1) && (y == hole_y || y == hole_y - 1);
+            const std::size_t at = static_cast<std::size_t>(y) * kWidth + x;
+            holes += near;
+            ASSERT_EQ(codes[at], near ? 1 : whole[at]) << x << ", " << y;
+            for (int c = 0; c < channels; ++c)
+                ASSERT_EQ(after.at(x, y, c), near ? 0.0f : before.at(x, y, c)) << x << ", " << y;
+        }
+    EXPECT_EQ(holes, nearest ? 1 : 4);
+}
+
+TEST(Registrar, WhatIsNotFiniteInTheSourceIsOutside) {
+    for (const float value :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+          -std::numeric_limits<float>::infinity()})
+        for (const int channels : {1, 3})
+            for (const bool nearest : {false, true})
+                expect_not_finite_is_invalid(channels, nearest, value);
+}
+
 TEST(Registrar, MapIsWhereTheRigSendsEachPixel) {
     const Rig rig = small_rig(5);
     const Image depth = some_depth(6);

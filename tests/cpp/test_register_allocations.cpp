@@ -58,7 +58,7 @@ TEST(Registrar, AllocatesNothingForAFrame) {
 }
 
 TEST(CApi, AllocatesNothingForAFrame) {
-    const xcalib_camera camera{321, 240, 300, 300, 160, 119.5, 0};
+    const xcalib_camera camera{321, 240, 300, 300, 160, 119.5, 0, XCALIB_LENS_NONE, {}};
     const xcalib_rig rig{camera, camera, {1, 0, 0, 0}, {-0.3, 0.01, 0.02}, 0, 0, 0};
     xcalib_registrar* registrar = nullptr;
     ASSERT_EQ(xcalib_create(&rig, nullptr, &registrar), XCALIB_OK);

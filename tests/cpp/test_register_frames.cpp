@@ -30,7 +30,8 @@ class RegisteringFrames : public ::testing::TestWithParam<const char*> {
         RegistrationOptions options;
         options.registrar.num_threads = threads;
         options.part_frames = 4;
-        return register_frames(frames(), straight(), out(), options, command, inputs, codecs,
+        options.overwrite = overwrite;
+        return register_frames(frames(), straight(), out(), options, command, inputs, {}, codecs,
                                [this](const Registration& now) { last = now; });
     }
     Frames frames() const {
@@ -63,7 +64,7 @@ class RegisteringFrames : public ::testing::TestWithParam<const char*> {
     TextCodecs codecs;
     std::function<void(int)> meet_reference = [](int) {}, meet_source = [](int) {},
                              meet_depth = [](int) {};
-    bool concurrent = true, steadied = false;
+    bool concurrent = true, steadied = false, overwrite = false;
     Registration last;
 };
 INSTANTIATE_TEST_SUITE_P(Outputs, RegisteringFrames, ::testing::Values("out", "out.mkv"),
@@ -160,6 +161,16 @@ TEST_P(RegisteringFrames, ADiskThatFillsUpIsAnError) {
         EXPECT_EQ(file.find("partial"), std::string::npos) << file;
     codecs.meet = [](const std::string&) {};
     EXPECT_GT(run().earlier, 10);
+    expect_whole();
+}
+
+TEST_P(RegisteringFrames, ReplacesNothingThatOthersHaveMade) {
+    const auto file = video() ? out() : out() / "000003.png";
+    write_text(file, "mine");
+    EXPECT_TRUE(has(refusal([&] { run(); }), file.string() + " is there"));
+    EXPECT_EQ(contents(), (Files{{file.lexically_relative(scratch / "").string(), "mine"}}));
+    overwrite = true;
+    run();
     expect_whole();
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "every_target.hpp"
+#include "geometry/projector.hpp"
 #include "scenes.hpp"
 #include "xcalib/register.hpp"
 
@@ -56,7 +57,24 @@ struct Place {
     double u, v, z, slack;
 };
 
+// Where lenses bend: floats are off before the source's lens and after it.
+Place bent_place(const Rig& rig, int x, int y, double depth) {
+    const Eigen::Vector3d ray = unproject(rig.reference, x, y, 1);
+    const Eigen::Vector3d p = depth * (rig.R() * ray) + rig.t();
+    const Eigen::Vector2d at = transfer(rig, x, y, depth), point = p.hnormalized();
+    const Eigen::Vector3d off =
+        8 * 6e-8 * (depth * rig.R().cwiseAbs() * ray.cwiseAbs() + rig.t().cwiseAbs());
+    const double rounding = (off.head<2>().norm() + point.norm() * off.z()) / std::abs(p.z());
+    const double f = std::max(rig.source.fx, rig.source.fy) + std::abs(rig.source.skew);
+    const double bends = rig.source_lens().derivative(point).norm();
+    const double centre = std::abs(rig.source.cx) + std::abs(rig.source.cy);
+    return {at.x(), at.y(), p.z(),
+            f * bends * (2 * rounding + 8 * 6e-8 * point.norm()) + 8 * 6e-8 * (centre + at.norm()) +
+                1e-6};
+}
+
 Place place(const Rig& rig, int x, int y, double depth) {
+    if (rig.reference.lens.bends() || rig.source.lens.bends()) return bent_place(rig, x, y, depth);
     const Eigen::Matrix3d h = infinite_homography(rig);
     const Eigen::Vector3d k = rig.source.K() * rig.t(), pixel(x, y, 1);
     const Eigen::Vector3d p = depth * h * pixel + k;
@@ -113,6 +131,12 @@ int expect_by_the_book(const Rig& rig, const Frame<T>& source, const std::vector
             EXPECT_EQ(code, 3) << where;
         } else {
             const Place p = place(rig, i % width, i / width, d);
+            if (std::isnan(p.u)) {  // behind the camera, or a lens shows nothing
+                if (p.z > kNearestZ * 1.01 || std::isnan(p.z)) {
+                    EXPECT_EQ(code, 1) << where;
+                }
+                continue;
+            }
             const double beyond = std::max({-p.u, p.u - right, -p.v, p.v - bottom});
             const bool behind = p.z<kNearestZ * 0.99, ahead = p.z> kNearestZ * 1.01;
             if (behind || beyond > 1e-3 + p.slack) {
@@ -168,7 +192,8 @@ std::vector<float> some_depth(std::mt19937& random, int count) {
 }
 
 // Cameras that hardly look the same way, beside and ahead of each other, of any scale.
-Rig any_rig(std::mt19937& random, int width, int height, int source_width, int source_height) {
+Rig any_rig(std::mt19937& random, int width, int height, int source_width, int source_height,
+            bool lenses) {
     Rig rig = random_rig(random, width, height, source_width, source_height);
     const double zoom = std::exp(uniform(random, -1, 1));
     rig.source.fx *= zoom;
@@ -181,12 +206,18 @@ Rig any_rig(std::mt19937& random, int width, int height, int source_width, int s
             rig.source_from_reference.translation.z() = -uniform(random, 1, 20);
             break;
     }
+    if (!lenses) return rig;
+    const int bent = 1 + random() % 3;
+    if (bent & 1) rig.source.lens = random_lens(random);
+    if (bent & 2) rig.reference.lens = random_lens(random);
+    if (random() % 2) rig = with_flipped_source(rig);
     return rig;
 }
 
 // Side by side, from a source that is coarser than the reference to one four times as fine.
 template <class T>
-void expect_usual_paths_agree(unsigned seed) {
+void expect_usual_paths_agree(unsigned seed, const Lens& source_lens = {},
+                              const Lens& reference_lens = {}) {
     on_every_target([&] {
         std::mt19937 random(seed);
         for (const int source_width : {64, 90, 150, 210, 400, 800}) {
@@ -196,6 +227,8 @@ void expect_usual_paths_agree(unsigned seed) {
                     {}};
             rig.source_from_reference.translation = {uniform(random, -0.2, 0.2), 0.01, 0.02};
             rig = turned(rig, {0.01, -0.01, 0.02});
+            rig.source.lens = source_lens;
+            rig.reference.lens = reference_lens;
             const auto source = random_frame<T>(random, source_width, source_height, 1);
             std::vector<float> depth(std::size_t(width) * height);
             for (int i = 0; i < width * height; ++i)  // a slope, and things before it
@@ -209,6 +242,24 @@ void expect_usual_paths_agree(unsigned seed) {
 TEST(RegisterPaths, AgreeOnUsualBytes) { expect_usual_paths_agree<std::uint8_t>(11); }
 TEST(RegisterPaths, AgreeOnUsual16Bits) { expect_usual_paths_agree<std::uint16_t>(12); }
 TEST(RegisterPaths, AgreeOnUsualFloats) { expect_usual_paths_agree<float>(13); }
+
+const Lens kBrown(LensModel::brown, {-0.3, 0.1, 0.002, -0.003, 0.01});
+const Lens kRational(LensModel::brown, {0.2, 0.1, 0.002, -0.003, 0.01, 0.5, 0.1, 0.02});
+const Lens kFisheye(LensModel::fisheye, {0.02, -0.01, 0.002, 0.001});
+
+TEST(RegisterPaths, AgreeOnUsualBytesThroughLenses) {
+    expect_usual_paths_agree<std::uint8_t>(11, kBrown);
+    expect_usual_paths_agree<std::uint8_t>(12, kRational, kBrown);
+    expect_usual_paths_agree<std::uint8_t>(13, {}, kFisheye);
+}
+TEST(RegisterPaths, AgreeOnUsual16BitsThroughLenses) {
+    expect_usual_paths_agree<std::uint16_t>(14, kRational);
+    expect_usual_paths_agree<std::uint16_t>(15, kFisheye, kBrown);
+}
+TEST(RegisterPaths, AgreeOnUsualFloatsThroughLenses) {
+    expect_usual_paths_agree<float>(16, kFisheye);
+    expect_usual_paths_agree<float>(17, kBrown, kRational);
+}
 
 // What lies on whole pixels is not interpolated, by no path.
 TEST(RegisterPaths, OneCameraTwiceGivesTheSource) {
@@ -230,7 +281,7 @@ TEST(RegisterPaths, OneCameraTwiceGivesTheSource) {
 }
 
 template <class T>
-void expect_every_path_agrees(unsigned seed, int channels) {
+void expect_every_path_agrees(unsigned seed, int channels, bool lenses = false) {
     on_every_target([&] {
         std::mt19937 random(seed);
         int valid = 0;
@@ -244,7 +295,7 @@ void expect_every_path_agrees(unsigned seed, int channels) {
                                                               {129, 64},
                                                               {300, 20}}) {
                 const int height = 1 + static_cast<int>(random() % 9);
-                const Rig rig = any_rig(random, width, height, source_width, source_height);
+                const Rig rig = any_rig(random, width, height, source_width, source_height, lenses);
                 const auto source = random_frame<T>(random, source_width, source_height, channels);
                 const std::vector<float> depth = some_depth(random, width * height);
                 valid += expect_by_the_book(rig, source, depth, 1);
@@ -263,6 +314,12 @@ TEST(RegisterPaths, AgreeOn16Bits) { expect_every_path_agrees<std::uint16_t>(3, 
 TEST(RegisterPaths, AgreeOn16BitsInColour) { expect_every_path_agrees<std::uint16_t>(4, 3); }
 TEST(RegisterPaths, AgreeOnFloats) { expect_every_path_agrees<float>(5, 1); }
 TEST(RegisterPaths, AgreeOnFloatsInColour) { expect_every_path_agrees<float>(6, 3); }
+
+TEST(RegisterPaths, AgreeThroughLenses) {
+    expect_every_path_agrees<std::uint8_t>(21, 1, true);
+    expect_every_path_agrees<std::uint16_t>(22, 3, true);
+    expect_every_path_agrees<float>(23, 1, true);
+}
 
 // Memory that ends, or begins, where a page begins, or ends, that may not be touched: of a gather
 // that goes beyond, the address sanitizer sees nothing.
@@ -299,7 +356,7 @@ void expect_nothing_beside_is_touched(unsigned seed) {
             const int width = 1 + random() % 70, height = 1 + random() % 9;
             const int source_width = 2 + random() % (i % 2 ? 5 : i % 4 ? 40 : 150);
             const int source_height = 2 + random() % 20, channels = i % 3 ? 1 : 3;
-            const Rig rig = any_rig(random, width, height, source_width, source_height);
+            const Rig rig = any_rig(random, width, height, source_width, source_height, i % 2);
             const std::ptrdiff_t pixel = std::ptrdiff_t(sizeof(T)) * channels;
             const std::ptrdiff_t row = pixel * source_width + (i % 4 ? 0 : 3 * sizeof(T));
             // Nothing follows the last pixel of the last row.

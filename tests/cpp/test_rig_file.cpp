@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -68,6 +69,11 @@ class RigFile : public ::testing::Test {
         EXPECT_TRUE(has(message, path_)) << "where '" << from << "' became '" << to << "'";
         EXPECT_EQ(message.find('\n'), std::string::npos) << message;
         return message;
+    }
+
+    std::string text() const {
+        std::ifstream in(path_);
+        return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
     }
 
     std::size_t files() const {
@@ -216,8 +222,6 @@ TEST_F(RigFile, WhatCannotBeWrittenIsASystemErrorAndLeavesNothing) {
     EXPECT_EQ(files(), 0u);
     EXPECT_THROW(save_rig(rig, folder_.string()), std::system_error);  // a folder of that name
     EXPECT_EQ(files(), 0u);
-    for (const auto& entry : fs::directory_iterator(folder_.parent_path()))
-        EXPECT_FALSE(has(entry.path().string(), folder_.string() + ".part"));
 }
 
 TEST_F(RigFile, ARigThatIsNotValidIsNotWritten) {
@@ -278,6 +282,121 @@ TEST_F(RigFile, AMirroredSourceIsKeptInVersion2) {
     EXPECT_EQ(in_c.source_mirrored, 1);
     EXPECT_TRUE(has(refusal_with("version: 1", "version: 2\nsource_mirrored: perhaps"),
                     "source_mirrored = perhaps, expected true or false"));
+}
+
+TEST_F(RigFile, LensesAreKeptInVersion2) {
+    std::ofstream(path_) << kText;
+    Rig rig = load_rig(path_);
+    rig.reference.lens = Lens(LensModel::fisheye, {0.01, -0.002, 0, 1e-5});
+    rig.source.lens = Lens(LensModel::brown, {-0.367, 0.03, 0.007, 0.003, 0.1 + 0.2});
+    save_rig(rig, path_);
+    EXPECT_TRUE(has(text(), "version: 2\n"));
+    EXPECT_TRUE(
+        has(text(), "  lens:\n    model: fisheye\n    coefficients: [0.01, -0.002, 0, 1e-05]"));
+    const Rig back = load_rig(path_);
+    EXPECT_EQ(back.reference.lens, rig.reference.lens);
+    EXPECT_EQ(back.source.lens, rig.source.lens);
+    EXPECT_EQ(back.source.lens.coefficients().size(), 5u);
+    rig.reference.lens = rig.source.lens = Lens();
+    save_rig(rig, path_);
+    EXPECT_TRUE(has(text(), "version: 1\n")) << "which older software reads";
+    xcalib_rig in_c;
+    save_rig(back, path_);
+    ASSERT_EQ(xcalib_load_rig(path_.c_str(), &in_c), XCALIB_OK);
+    EXPECT_EQ(in_c.reference.lens, XCALIB_LENS_FISHEYE);
+    EXPECT_EQ(in_c.reference.lens_coefficients[3], 1e-5);
+    EXPECT_EQ(in_c.source.lens, XCALIB_LENS_BROWN);
+    EXPECT_EQ(in_c.source.lens_coefficients[4], 0.1 + 0.2);
+    EXPECT_EQ(in_c.source.lens_coefficients[5], 0);
+}
+
+TEST_F(RigFile, ALensThatIsNoneIsNamed) {
+    const auto with = [&](const std::string& lens) {
+        return refusal_with("  skew: 0.25\n", "  skew: 0.25\n  lens: " + lens + "\n");
+    };
+    EXPECT_TRUE(has(with("{model: tele, coefficients: []}"),
+                    "source.lens.model = tele, expected none, brown or fisheye"));
+    EXPECT_TRUE(has(with("{model: brown, coefficients: [1, 2, 3]}"),
+                    "source.lens: a lens of model "
+                    "brown has 3 coefficients"));
+    EXPECT_TRUE(has(with("{model: brown, coefficients: 1}"),
+                    "source.lens.coefficients = 1, expected a list of numbers"));
+    EXPECT_TRUE(has(with("{model: brown, coefficients: [1, 2, 3, .inf]}"), "expected a finite"));
+    EXPECT_TRUE(has(with("brown"), "expected a mapping of fields in source.lens"));
+}
+
+TEST_F(RigFile, ANumberThatNoDoubleHoldsIsRefused) {
+    for (const char* value : {"1e400", "-1e400", "1e-400"})
+        EXPECT_TRUE(has(refusal_with("fx: 600", "fx: " + std::string(value)),
+                        "reference.fx = " + std::string(value) + ", expected a finite number"));
+    EXPECT_TRUE(has(refusal_with("[0.1, -0.2, 0.3]", "[0.1, 1e400, 0.3]"), "= 1e400, expected"));
+    EXPECT_TRUE(has(refusal_with("width: 640", "width: 99999999999"), "width = 99999999999"));
+    EXPECT_LT(refusal_with("xcalib-rig", std::string(5000, 'x')).size(), path_.size() + 150);
+    // Of a number of many digits a few are quoted.
+    const std::string message = refusal_with("fx: 600", "fx: x" + std::string(300, '1'));
+    EXPECT_LT(message.size(), path_.size() + 150) << message;
+    EXPECT_TRUE(has(message, "... (301 characters), expected a finite number"));
+}
+
+TEST_F(RigFile, IsOneDocumentWithEachKeyOnce) {
+    EXPECT_TRUE(has(refusal_with("  fx: 600\n", "  fx: 600\n  fx: 601\n"),
+                    "'fx' is given again in line 7, expected once"));
+    EXPECT_TRUE(
+        has(refusal_with("format: xcalib-rig\n", "format: xcalib-rig\nformat: xcalib-rig\n"),
+            "'format' is given again"));
+    EXPECT_TRUE(has(refusal_with("format", "---\na: 1\n---\nformat"), "a second document"));
+    EXPECT_TRUE(has(refusal_with("fx: 600\n  fy: 601.5", "fx: &a 600\n  fy: *a"),
+                    "an alias (*) in line 7"));
+}
+
+TEST_F(RigFile, IsOfBoundedSizeAndDepth) {
+    EXPECT_TRUE(
+        has(refusal_with("[0.1, -0.2, 0.3]", std::string(400, '[')), "nested more than 16"));
+    EXPECT_TRUE(has(refusal_with("[0.1, -0.2, 0.3]", std::string(200000, '[')), "nested"));
+    std::string keys;
+    for (int i = 0; i < 20000; ++i) keys += "k" + std::to_string(i) + ": 1\n";
+    EXPECT_TRUE(has(refusal_with("format", keys + "format"), "more than 10000 values"));
+    EXPECT_TRUE(has(refusal_with("format", "#" + std::string(1 << 20, ' ') + "\nformat"),
+                    "bytes, expected at most 1048576"));
+}
+
+TEST_F(RigFile, HelpsWithFieldsThatAreMissingOrUnknown) {
+    EXPECT_TRUE(
+        has(refusal_with("  skew: 0\n", ""),
+            "missing field 'skew' in reference, expected width, height, fx, fy, cx, cy, skew"));
+    EXPECT_TRUE(has(refusal_with("version: 1\n", "version: 1\nnotes: mine\n"),
+                    "unknown field 'notes' in the file, expected format, version"));
+    EXPECT_TRUE(has(refusal_with("width: 640", "width: 640.0"),
+                    "width = 640.0, expected a whole number of px, at least 1, as in 640"));
+}
+
+TEST_F(RigFile, AQuaternionOfFewDigitsIsMadeUnit) {
+    write_with("[1, 0, 0, 0]", "[0.9998, 0.02, 0, 0]");
+    const Rig rig = load_rig(path_);
+    EXPECT_NEAR(rig.source_from_reference.rotation.norm(), 1, 1e-15);
+    EXPECT_NEAR(rig.source_from_reference.rotation.x(), 0.02, 1e-5);
+    EXPECT_TRUE(has(refusal_with("[1, 0, 0, 0]", "[1.002, 0, 0, 0]"),
+                    "of length 1.002, expected w, x, y, z of length 1, to within 0.001"));
+}
+
+TEST_F(RigFile, SaysWhatIsNotPlausible) {
+    write_with("format", "format");
+    EXPECT_TRUE(implausible(load_rig(path_)).empty());
+    const auto said = [&](const std::string& from, const std::string& to) {
+        write_with(from, to);
+        const std::vector<std::string> lines = implausible(load_rig(path_));
+        return lines.size() == 1 ? lines[0] : std::to_string(lines.size()) + " lines";
+    };
+    EXPECT_EQ(said("cx: 319.5", "cx: 58250"),
+              "reference.cx = 58250 is not plausible: it lies far outside of the image, of 640 px");
+    EXPECT_TRUE(has(said("[0.1, -0.2, 0.3]", "[127, -8, -55]"), "was it in millimetres?"));
+    EXPECT_TRUE(has(said("fx: 600\n", "fx: 4.5\n"), "reference.fx = 4.5 is not plausible"));
+    EXPECT_TRUE(has(said("skew: 0.25", "skew: 250"), "source.skew = 250"));
+}
+
+TEST_F(RigFile, IsAFileAndNoPipe) {
+    ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+    EXPECT_TRUE(has(refusal([&] { load_rig(path_); }), "is a pipe or a device, expected a file"));
 }
 
 TEST_F(RigFile, ReadsTheSameInC) {

@@ -73,12 +73,12 @@ TEST_F(FolderSinks, WriteUnderTheNamesOfTheFrames) {
 
 TEST_F(FolderSinks, KnowWhatIsThere) {
     run(4, 3, false);
-    write_text(out() / "masks/.000002.png.77.partial", "half");  // of a killed run
+    write_text(out() / "masks/.000002.png.0123456789abcdef.partial", "half");  // of a killed run
     std::filesystem::remove(out() / "000001.png");
     const auto done = run(4, 4);
     EXPECT_EQ(done, (std::map<std::string, long>{{key_of(0), 8}, {key_of(2), 8}}));
     EXPECT_EQ(written, 3 + 2);
-    EXPECT_FALSE(std::filesystem::exists(out() / "masks/.000002.png.77.partial"));
+    EXPECT_FALSE(std::filesystem::exists(out() / "masks/.000002.png.0123456789abcdef.partial"));
     EXPECT_EQ(run(2, 0).size(), 2u);  // of frames that are not wanted nothing is said
 }
 
@@ -90,6 +90,7 @@ TEST_F(FolderSinks, FloatsAreTiff) {
     const Image image(4, 2, 0.0f);
     result.image = {image.view(), nullptr};
     sink->write(0, {"k", "a"}, result);
+    sink->keep();
     EXPECT_TRUE(std::filesystem::exists(out() / "a.tiff"));
     EXPECT_TRUE(std::filesystem::exists(out() / "masks/a.png"));
 }
@@ -140,10 +141,45 @@ TEST_F(VideoSinks, KilledLoseTheOpenPartAndNoMore) {
     std::filesystem::remove_all(scratch / "out.mkv.parts");
     std::filesystem::rename(scratch / "copy", scratch / "out.mkv.parts");
     std::filesystem::rename(scratch / "copied journal", journal_of(out()));
-    write_text(scratch / "out.mkv.parts/mine", "");
     EXPECT_EQ(run(8, 8).size(), 3u);
     EXPECT_EQ(written, 5);
     EXPECT_EQ(text_of(out()), kEight);
+    EXPECT_FALSE(std::filesystem::exists(scratch / "out.mkv.parts"));
+}
+
+TEST_F(FolderSinks, LeaveAloneWhatOthersHavePutThere) {
+    const std::filesystem::path digits = ".0123456789abcdef.partial";
+    run(4, 3, false);
+    std::filesystem::create_directory_symlink(scratch / "elsewhere", out() / "overlays");
+    const Files others = {{"out/.x.partial", "1"},
+                          {"out/.x" + digits.string(), "2"},
+                          {"out/.000003.png.partial", "3"},
+                          {"out/masks/.000003.png.0123.partial", "4"},
+                          {"elsewhere/.000003.png" + digits.string(), "5"}};
+    for (const auto& [name, text] : others) write_text(scratch / name, text);
+    run(4, 4);
+    for (const auto& [name, text] : others) EXPECT_EQ(text_of(scratch / name), text) << name;
+}
+
+TEST_F(VideoSinks, LeaveAloneWhatOthersHavePutAmongTheParts) {
+    run(8, 5, false);
+    const Files others = {{"out.mkv.parts/mine", "1"},
+                          {"out.mkv.parts/0123456789abcdef.mkv", "2"},
+                          {"out.mkv.parts/.mine.0123456789abcdef.partial", "3"},
+                          {"elsewhere", "4"}};
+    for (const auto& [name, text] : others) write_text(scratch / name, text);
+    // A link where a part would be is replaced, not followed.
+    const auto link = scratch / ("out.mkv.parts/" + key_of(5) + ".mkv");
+    std::filesystem::create_symlink(scratch / "elsewhere", link);
+    run(8, 8);
+    EXPECT_EQ(text_of(out()), kEight);
+    for (const auto& [name, text] : others) EXPECT_EQ(text_of(scratch / name), text) << name;
+}
+
+TEST_F(VideoSinks, RefuseAFolderOfPartsThatIsALink) {
+    std::filesystem::create_directory(scratch / "elsewhere");
+    std::filesystem::create_symlink(scratch / "elsewhere", scratch / "out.mkv.parts");
+    EXPECT_TRUE(has(refusal([&] { run(8, 8); }), "out.mkv.parts is no folder"));
 }
 
 TEST_F(VideoSinks, OfOtherFramesKeepThePartsThatStillFollow) {
@@ -230,6 +266,35 @@ TEST(VideoImages, AreWhatTheSuffixHolds) {
     EXPECT_TRUE(has(message("a.mkv", f32), "float32 gray"));
     EXPECT_EQ(message("a.avi", odd),
               "a.avi: the images are 5x2; a video holds even sizes, a folder any");
+}
+
+TEST(Outputs, AreNotThoseOfOthers) {
+    const Scratch scratch;
+    const std::vector<FrameName> names = frames(2);
+    const auto refused = [&](const std::filesystem::path& output, bool overlays = false) {
+        return refusal([&] { check_not_others(output, output_files(output, names, overlays)); });
+    };
+    for (const char* file : {"out/masks/000001.png", "o.masks.mkv", "p.overlay.mp4"})
+        write_text(scratch / file, "mine");
+    EXPECT_EQ(refused(scratch / "out"),
+              (scratch / "out/masks/000001.png").string() + " is there, and " +
+                  (scratch / "out/register.jsonl").string() +
+                  " does not say that a run made it; expected another output, or --overwrite");
+    EXPECT_TRUE(has(refused(scratch / "o.avi"), "o.masks.mkv is there"));
+    EXPECT_EQ(refused(scratch / "p.mp4"), "");
+    EXPECT_TRUE(has(refused(scratch / "p.mp4", true), "p.overlay.mp4 is there"));
+}
+
+TEST(Outputs, ShareNoMasks) {
+    const Scratch scratch;
+    const auto refused = [&](const char* name) {
+        return refusal([&] { check_alone(scratch / name); });
+    };
+    write_text(scratch / "o.mp4.register.jsonl", "of o.mp4");
+    write_text(scratch / "q.avi.register.jsonl", "");  // which has made nothing yet
+    EXPECT_EQ(refused("o.avi"), (scratch / "o.avi").string() + " would share o.masks.mkv with " +
+                                    (scratch / "o.mp4").string() + ", expected another name");
+    for (const char* name : {"o.mp4", "p.avi", "q.mkv", "o"}) EXPECT_EQ(refused(name), "") << name;
 }
 
 TEST(Outputs, AreVideosByTheirSuffixUnlessFolders) {

@@ -54,20 +54,25 @@ TEST(ErrorModel, GrowsWithWhatTheHalvesDisagreeOnAtTheDepthsAtWhichTheyDo) {
     const Plan plan{CalibrationOptions{}};
     Rig moved = scene.truth;
     moved.source_from_reference.translation.x() += 0.05;  // nothing that is far moves
-    const ErrorModel same(scene.images, scene.truth, both(scene.truth, scene.truth), plan);
-    const ErrorModel apart(scene.images, scene.truth, both(scene.truth, moved), plan);
+    const ErrorModel same(scene.images, finest(scene), scene.truth, both(scene.truth, scene.truth),
+                          plan);
+    const ErrorModel apart(scene.images, finest(scene), scene.truth, both(scene.truth, moved),
+                           plan);
     EXPECT_NEAR(apart.at(0).median, same.at(0).median, 1e-3);
     EXPECT_GT(apart.at(0.5).median, 2 * same.at(0.5).median);
     EXPECT_GT(apart.over_footage().median, same.over_footage().median);
     EXPECT_GT(same.over_footage().p95, same.over_footage().median);
     Halves none;
-    EXPECT_EQ(ErrorModel(scene.images, scene.truth, none, plan).over_footage().median, kInfinity);
+    EXPECT_EQ(
+        ErrorModel(scene.images, finest(scene), scene.truth, none, plan).over_footage().median,
+        kInfinity);
 }
 
 TEST(Plausible, NamesWhatNobodyWouldBuild) {
     const Scene scene = make_scene(3, 150, 4);
     const Plan plan{CalibrationOptions{}};
-    const ErrorModel model(scene.images, scene.truth, both(scene.truth, scene.truth), plan);
+    const ErrorModel model(scene.images, finest(scene), scene.truth, both(scene.truth, scene.truth),
+                           plan);
     EXPECT_FALSE(implausible_in(scene.truth, 4, plan, model));
     const struct {
         void (*spoil)(Rig&);
@@ -110,6 +115,14 @@ TEST(DepthCheck, SeesDepthThatBelongsToAnotherFrameOrToNone) {
         for (Image& depth : depths) depth = depths[0];
     });
     EXPECT_FALSE(checked().exchangeable);
+    EXPECT_TRUE(checked().one_for_all);
+    change([](std::vector<Image>& depths) {
+        for (Image& depth : depths)
+            for (int y = 0; y < depth.height; ++y)  // a road, and the sky above it
+                for (int x = 0; x < depth.width; ++x)
+                    depth.row(y)[x] = 2.0f / std::max(0.05f, 2.0f * y / depth.height - 0.9f);
+    });
+    EXPECT_FALSE(checked().one_for_all);
     change([](std::vector<Image>& depths) {
         for (Image& depth : depths) std::fill(depth.pixels.begin(), depth.pixels.end(), 5.0f);
     });
@@ -131,6 +144,7 @@ TEST(DepthCheck, NamesWhatIsWrong) {
         const char* reason;
     } cases[] = {
         {[](DepthCheck& check) { check.relief = 0; }, "every depth is the same"},
+        {[](DepthCheck& check) { check.one_for_all = true; }, "all frames have the same depth"},
         {[](DepthCheck& check) { check.inverse = 0.6; }, "inverse depth fits better"},
         {[](DepthCheck& check) { check.none = 0.6; }, "no depth at all fits better"},
         {[](DepthCheck& check) { check.exchanged = 0.5; }, "fits as well as each frame's own"},
@@ -195,13 +209,13 @@ TEST(Verdict, HalvesThatDisagreeHaveFoundNothing) {
     const Plan plan{CalibrationOptions{}};
     CalibrationReport report;
     report.valid_share = 0.9;
-    judge(scene.images, scene.truth, both(scene.truth, scene.truth), plan, report);
+    judge(scene.images, finest(scene), scene.truth, both(scene.truth, scene.truth), plan, report);
     EXPECT_TRUE(report.verdict.found);
     EXPECT_TRUE(report.verdict.trusted) << report.verdict.line();
     EXPECT_TRUE(report.verdict.advice.empty());
     EXPECT_EQ(report.verdict.by_depth.size(), 7u);
     const Rig off = turned(scene.truth, {0.05, -0.05, 0.0});
-    judge(scene.images, scene.truth, both(scene.truth, off), plan, report);
+    judge(scene.images, finest(scene), scene.truth, both(scene.truth, off), plan, report);
     EXPECT_FALSE(report.verdict.found);
     EXPECT_FALSE(report.verdict.trusted);
     EXPECT_NE(report.verdict.reason.find("px apart"), std::string::npos) << report.verdict.reason;
@@ -216,7 +230,8 @@ TEST(Verdict, IsTrustedWithinTheToleranceOnly) {
     report.valid_share = 0.9;
     for (const bool wide : {true, false}) {
         options.tolerance = wide ? Tolerance{50, 100} : Tolerance{1e-3, 2e-3};
-        judge(scene.images, scene.truth, both(scene.truth, scene.truth), Plan(options), report);
+        judge(scene.images, finest(scene), scene.truth, both(scene.truth, scene.truth),
+              Plan(options), report);
         EXPECT_TRUE(report.verdict.found);
         EXPECT_EQ(report.verdict.trusted, wide) << report.verdict.line();
     }

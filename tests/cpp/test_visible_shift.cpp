@@ -54,10 +54,10 @@ TEST(Verdict, AFitThatFlowSeesToBeOffIsNotTrusted) {
         same.independent = true;
         return same;
     };
-    judge(scene.images, scene.truth, halves(scene.truth), plan, report);
+    judge(scene.images, finest(scene), scene.truth, halves(scene.truth), plan, report);
     EXPECT_TRUE(report.converged) << report.message;
     const Rig off = turned(scene.truth, {0.012, -0.012, 0.0});
-    judge(scene.images, off, halves(off), plan, report);
+    judge(scene.images, finest(scene), off, halves(off), plan, report);
     EXPECT_FALSE(report.converged);
     EXPECT_GT(report.visible_shift_px, 3);
     EXPECT_NE(report.message.find("still sees a shift of"), std::string::npos) << report.message;

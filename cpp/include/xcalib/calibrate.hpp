@@ -21,6 +21,9 @@ struct CalibrationResult {
     Rig rig;
     bool converged = false;
     CalibrationReport report;
+
+    // For what is found out about the footage later. The report's message keeps what it said.
+    void distrust(const std::string& reason, const std::string& advice);
 };
 
 // Called with the stage and the share of all work done, (0, 1], from the calling thread.

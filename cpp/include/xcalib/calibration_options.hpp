@@ -75,6 +75,11 @@ struct CalibrationOptions {
     // Known intrinsics are taken as they are and frozen.
     std::optional<Pinhole> reference_camera;
     std::optional<Pinhole> source_camera;
+    // Known lenses of the images as they are, taken and frozen, before any that a camera above or
+    // the initial rig has. None: those, or no lens; but k1 and k2 of a source without one are
+    // estimated, and kept where frames gain by them that the fit has not seen.
+    std::optional<Lens> reference_lens;
+    std::optional<Lens> source_lens;
     // Start of the reference's horizontal field of view; searched where neither is given. (0, 180)
     std::optional<double> reference_hfov_deg;
     // The reference's intrinsics and the source's are coupled (a gauge): free only on request, save

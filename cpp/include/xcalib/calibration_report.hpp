@@ -33,6 +33,15 @@ struct CandidateReport {
     Rig refined;                                           // after refinement at the coarse level
 };
 
+// What k1 and k2 of the source are worth.
+struct LensReport {
+    bool tried = false;
+    int coefficients = 0;  // that are kept: none, k1, or k1 and k2
+    // In NEC by the last one that was tried, of frames that the fit has not seen: the mean, and its
+    // standard deviation; of all frames where they gain too little to look further.
+    double gain = 0.0, gain_deviation = 0.0;
+};
+
 // A step of Adam, before it is taken: means over its batch.
 struct AdamStep {
     double learning_rate = 0.0;
@@ -43,6 +52,28 @@ struct AdamStep {
 };
 
 class ErrorModel;  // calibrate.hpp: expected_error_map
+// The fit with the sources some frames later, refitted.
+struct LagFit {
+    int lag = 0;         // that a source is later than its own frame [source frames]
+    int frames = 0;      // of the references looked at, those that have such a source
+    int factor = 1;      // of the level of the last fit: better lags are fitted further
+    double nec = 0.0;    // mean over the frames, there
+    double gain = 0.0;   // NEC of a frame above the same with its own source, there: mean
+    double error = 0.0;  // of the gain: its standard error
+    Rig rig;             // refitted
+};
+
+// By how much the source is late beside what it was paired with.
+struct LagReport {
+    int frames = 0;  // [source frames]; 0 too where the fits do not show it
+    // By how many frames the lag of the later half of the footage is the larger, where the halves
+    // differ: the source lost frames, or a pause of it was not counted.
+    int change = 0;
+    std::vector<LagFit> fits;  // by rising lag; none where the footage is no sequence
+
+    const LagFit& at(int lag) const;  // which must be among them
+    std::string line() const;         // how the fits compare
+};
 
 struct CalibrationReport {
     Verdict verdict;
@@ -61,10 +92,12 @@ struct CalibrationReport {
     std::vector<int> frames;                           // indices of the pairs used
     std::vector<CandidateReport> candidates;
     std::vector<LevelReport> levels;
+    LensReport lens;
     std::vector<AdamStep> steps;  // of Solver::adam
     std::shared_ptr<const ErrorModel> errors;
     // What can slide, and with what, while the footage's pixels move by a tenth of a pixel.
     std::vector<std::string> weak_directions;
+    LagReport lag;  // of fit_lags(), where the footage was a sequence
 
     std::string brief() const;  // one line
     std::string full() const;   // a table

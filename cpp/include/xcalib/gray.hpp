@@ -10,6 +10,10 @@ namespace XCALIB_EXPORT xcalib {
 // Throws std::invalid_argument, with the place, where a float32 pixel is not finite.
 Image to_gray(const ImageView& image);
 
+// The same, with pixels that are not finite filled from those around them, so that they have no
+// edges of their own. Throws std::invalid_argument where they are more than half of the image.
+Image known_gray(const ImageView& image);
+
 // Mean over the area that each new pixel covers; bilinear where a side grows.
 Image resize_area(const Image& image, int width, int height);
 

@@ -11,13 +11,15 @@
 namespace XCALIB_EXPORT xcalib {
 
 // The parameters of a rig in the order of every Jacobian of this library, scaled as
-// SolverParameters: source camera, rotation (R <- exp(w) R), translation, reference camera.
+// SolverParameters: source camera, rotation (R <- exp(w) R), translation, reference camera, and the
+// source's lens, a brown whose other coefficients stay (a fisheye, or a rational one, stays whole).
 // clang-format off
 enum Parameter : int {
     kSourceLogFx, kSourceLogFy, kSourceCx, kSourceCy, kSourceSkew,
     kRotationX, kRotationY, kRotationZ,
     kTranslationX, kTranslationY, kTranslationZ,
     kReferenceLogFx, kReferenceLogFy, kReferenceCx, kReferenceCy, kReferenceSkew,
+    kSourceK1, kSourceK2,
     kNumParameters
 };
 // clang-format on
@@ -54,12 +56,13 @@ struct PaperParameters {
     // Eq. (translation): column k in lambda_t^k m. The paper has the first two, and tries all
     // three.
     Eigen::Matrix3d translation = Eigen::Matrix3d::Zero();
+    double source_lens[2] = {0, 0};  // k1, k2: not the paper's
 };
 
 inline constexpr double kPaperTranslationScale = 10.0;  // lambda_t
 
-Rig rig_from_paper(const PaperParameters& parameters, int reference_width, int reference_height,
-                   int source_width, int source_height);
+// What is no parameter, as the image sizes and the lenses, is that of `rest`.
+Rig rig_from_paper(const PaperParameters& parameters, const Rig& rest);
 // The translation goes to the finest component whole: the split is not unique.
 PaperParameters paper_from_rig(const Rig& rig);
 
@@ -75,10 +78,14 @@ struct SolverParameters {
     Camera source;
     double quaternion[4];   // w x y z, unit
     double translation[3];  // [m]
+    double source_lens[2];  // k1, k2
 };
 
+// Are k1 and k2 parameters? Of no lens, or a brown that is a polynomial.
+bool has_lens_parameters(const Lens& lens);
+
 SolverParameters solver_from_rig(const Rig& rig);
-Rig rig_from_solver(const SolverParameters& parameters, int reference_width, int reference_height,
-                    int source_width, int source_height);
+// What is no parameter, as the image sizes and the lenses, is that of `rest`.
+Rig rig_from_solver(const SolverParameters& parameters, const Rig& rest);
 
 }  // namespace xcalib

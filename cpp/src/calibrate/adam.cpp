@@ -56,7 +56,8 @@ Loss prior_loss(const PaperParameters& p, const Rig& rig, const Rig& held) {
 }
 
 // What stage 1 freezes, what is known, and scales that are not used.
-std::vector<bool> frozen(int stage, const CalibrationOptions& options) {
+std::vector<bool> frozen(int stage, const Plan& plan) {
+    const CalibrationOptions& options = plan.options;
     std::vector<bool> held(kNumPaperVariables, false);
     for (const int first : {kPaperReference, kPaperSource}) {
         const bool known = first == kPaperSource ? options.source_camera.has_value()
@@ -68,6 +69,7 @@ std::vector<bool> frozen(int stage, const CalibrationOptions& options) {
         for (int axis = 0; axis < 3; ++axis)
             held[kPaperTranslation + 3 * scale + axis] =
                 scale >= options.adam.translation_scales || (stage == 1 && axis == 2);
+    for (int i = 0; i < 2; ++i) held[kPaperLens + i] = stage == 1 || i >= plan.lens_coefficients;
     return held;
 }
 
@@ -182,9 +184,8 @@ void solve_adam(const WorkingImages& images, const Plan& plan,
             paper_jacobian(paper, rig).transpose() *
                 (loss.image_gradient + options.flow_weight * loss.flow_gradient) +
             gamma * prior.gradient;
-        adam.step(x, gradient, frozen(stage, options), taken.learning_rate);
-        rig = rig_from_paper(paper_of(x), rig.reference.width, rig.reference.height,
-                             rig.source.width, rig.source.height);
+        adam.step(x, gradient, frozen(stage, plan), taken.learning_rate);
+        rig = rig_from_paper(paper_of(x), rig);
         progress(static_cast<double>(step + 1) / static_cast<double>(count));
 
         if (step + 1 != fine_from && step + 1 != count) continue;

@@ -10,6 +10,7 @@
 #include "base/parallel.hpp"
 #include "calibrate/adam.hpp"
 #include "calibrate/find_mounts.hpp"
+#include "calibrate/fit_lens.hpp"
 #include "calibrate/halves.hpp"
 #include "calibrate/relative_depth.hpp"
 #include "calibrate/start.hpp"
@@ -48,9 +49,10 @@ void validate(const std::vector<ImageView>& references, const std::vector<ImageV
     }
 }
 
-// Levenberg-Marquardt on all frames, from the level at which the start was found on some of them.
-void refine(const WorkingImages& images, const Start& found, const Plan& plan,
-            const Progress& notify, CalibrationResult& result) {
+// Levenberg-Marquardt on all frames, from the level at which the start was found on some of them. A
+// lens that is kept on the way moves from there on. Returns the finest level.
+Level refine(const WorkingImages& images, const Start& found, Plan& plan, const Progress& notify,
+             CalibrationResult& result) {
     CalibrationReport& report = result.report;
     const int num_threads = plan.options.num_threads;
     report.candidates = found.candidates;
@@ -64,15 +66,22 @@ void refine(const WorkingImages& images, const Start& found, const Plan& plan,
     const auto tolerance = [](int factor) { return factor == 2 ? 1e-6 : 1e-5; };
     const std::vector<Step> steps =
         schedule(report.working_width, report.working_height, plan.parts);
+    Level level;
     for (std::size_t s = 0; s < steps.size(); ++s) {
         if (steps[s].stage == 1 || steps[s].factor > from) continue;
-        const Level level = make_level(images, steps[s].factor, result.rig, num_threads);
+        level = make_level(images, steps[s].factor, result.rig, num_threads);
         if (limit == 0) limit = share_limit(pooled(level, result.rig, num_threads).valid_share);
         report.levels.push_back(solve_stage(images, level, steps[s].stage, limit,
                                             tolerance(steps[s].factor), plan, result.rig));
+        // One level is left to solve, if there are so many, with what was found.
+        if (plan.estimates_lens && steps[s].factor <= kLensFactor && !report.lens.tried) {
+            report.lens = fit_lens(level, limit, tolerance(steps[s].factor), plan, result.rig);
+            plan.lens_coefficients = report.lens.coefficients;
+        }
         notify("refine",
                0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
     }
+    return level;
 }
 
 // The footage, and how it is looked at in one attempt: sources that a mount mirrors are flipped, so
@@ -90,6 +99,8 @@ struct Attempt {
         images = std::make_shared<WorkingImages>(with_mirrored_sources(*all));
         if (plan.options.source_camera)
             plan.options.source_camera = base.options.source_camera->flipped();
+        if (plan.options.source_lens)
+            plan.options.source_lens = base.options.source_lens->flipped();
         if (given) initial = with_flipped_source(*given);
     }
 
@@ -102,7 +113,8 @@ void settle_relative_depth(Attempt& attempt, CalibrationResult& result) {
     const Plan& plan = attempt.plan;
     const double farthest = farthest_inverse_depth(*attempt.images);
     RelativeDepth relative = *plan.options.relative_depth;
-    const bool known = plan.options.source_camera.has_value();
+    // With another shift goes another source, but for what a lens bends.
+    const bool known = plan.options.source_camera || result.rig.source.lens.bends();
     const double shift = known ? best_shift(*attempt.images, plan, farthest, result.rig)
                                : ordinary_shift(result.rig, farthest);
     attempt.images = std::make_shared<WorkingImages>(with_shifted_depth(*attempt.images, shift));
@@ -119,17 +131,21 @@ void settle_relative_depth(Attempt& attempt, CalibrationResult& result) {
 }
 
 // From a rig to a result: what is left once it is solved.
-void settle(Attempt& attempt, const Halves& halves, CalibrationResult& result) {
+void settle(Attempt& attempt, const Level& finest, const Halves& halves,
+            CalibrationResult& result) {
     CalibrationReport& report = result.report;
     report.nec = report.levels.back().nec;
     report.valid_share = report.levels.back().valid_share;
-    judge(*attempt.images, result.rig, halves, attempt.plan, report);
+    judge(*attempt.images, finest, result.rig, halves, attempt.plan, report);
     if (attempt.plan.options.relative_depth) settle_relative_depth(attempt, result);
     result.converged = report.converged;
     result.rig = attempt.given(result.rig);
     result.rig.verdict = std::make_shared<const Verdict>(report.verdict);
     const std::string mount = Mount::of(result.rig).text();
     if (mount != Mount{}.text()) report.message += "; the source image is " + mount;
+    if (const Lens& lens = result.rig.source.lens; report.lens.coefficients > 0)
+        report.message += format("; the source's lens bends: k1 %.3f, k2 %.3f", lens.coefficient(0),
+                                 lens.coefficient(1));
     for (CandidateReport& candidate : report.candidates) {
         candidate.found = attempt.given(candidate.found);
         candidate.refined = attempt.given(candidate.refined);
@@ -137,8 +153,8 @@ void settle(Attempt& attempt, const Halves& halves, CalibrationResult& result) {
 }
 
 // The same where nothing was searched.
-void settle_refit(Attempt& attempt, CalibrationResult& result) {
-    settle(attempt,
+void settle_refit(Attempt& attempt, const Level& finest, CalibrationResult& result) {
+    settle(attempt, finest,
            refit_halves(*attempt.images, result.rig, attempt.plan,
                         result.report.levels.back().valid_share),
            result);
@@ -148,43 +164,27 @@ void settle_refit(Attempt& attempt, CalibrationResult& result) {
 // well edges agree at its start.
 double fit(Attempt& attempt, const ImageView& reference, const ImageView& source,
            const Progress& notify, double& search_seconds, CalibrationResult& result) {
-    const Plan& plan = attempt.plan;
+    Plan& plan = attempt.plan;
+    const WorkingImages& images = *attempt.images;
+    const auto searching = [&](double share) { notify("search", 0.05 + 0.55 * share); };
     if (!plan.searches) {  // there is nothing that two halves could find apart
-        const Start start =
-            find_start(*attempt.images, reference, source, attempt.initial, plan,
-                       [&](double share) { notify("search", 0.05 + 0.55 * share); });
+        const Start start = find_start(images, reference, source, attempt.initial, plan, searching);
         search_seconds += start.search_seconds;
-        refine(*attempt.images, start, plan, notify, result);
-        settle_refit(attempt, result);
+        const Level finest = refine(images, start, plan, notify, result);
+        settle_refit(attempt, finest, result);
         return start.merit;
     }
-    const CalibrationResult empty = result;
-    const auto refine_half = [&](const WorkingImages& half, Start& start) {
-        CalibrationResult out = empty;
-        refine(
-            half, start, plan, [](const std::string&, double) {}, out);
-        start.rig = out.rig;
-        start.levels = out.report.levels;
-    };
-    const Halves halves =
-        fit_halves(*attempt.images, reference, source, attempt.initial, plan, refine_half,
-                   [&](double share) { notify("search", 0.05 + 0.55 * share); });
+    const Halves halves = fit_halves(images, reference, source, attempt.initial, plan, searching);
     std::optional<Start> start = halves.start;
-    // The finest level reaches a pixel or so: from further off, the level before goes first.
-    constexpr double kNear = 1.0;
-    if (start && !(distance(halves, *attempt.images) < kNear))
-        while (start->levels.back().factor < 2) start->levels.pop_back();
     // Where they disagree, half of the frames may have been too few.
-    if (!agree(halves, *attempt.images)) {
-        Start whole =
-            find_start(*attempt.images, reference, source, attempt.initial, plan, [](double) {});
-        if (!start || merit_on(*attempt.images, whole.rig, plan) >
-                          merit_on(*attempt.images, start->rig, plan))
+    if (!agree(halves, images)) {
+        Start whole = find_start(images, reference, source, attempt.initial, plan, [](double) {});
+        if (!start || merit_on(images, whole.rig, plan) > merit_on(images, start->rig, plan))
             start = std::move(whole);
     }
     search_seconds += start->search_seconds;
-    refine(*attempt.images, *start, plan, notify, result);
-    settle(attempt, halves, result);
+    const Level finest = refine(images, *start, plan, notify, result);
+    settle(attempt, finest, halves, result);
     return start->merit;
 }
 
@@ -220,7 +220,9 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     const Progress notify = [&](const std::string& stage, double share) {
         if (progress) progress(stage, share);
     };
-    const Plan plan(options, flow, parts);
+    Plan plan(options, flow, parts);
+    if (initial) plan.fits_focal = false;  // it is known, as is a lens that it has
+    if (initial && initial->source.lens.bends()) plan.estimates_lens = false;
     validate(references, sources, depths, initial, options);
 
     const WorkersOfThread workers(resolve_threads(options.num_threads));
@@ -244,7 +246,8 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
         solve_adam(
             *attempt.images, attempt.plan,
             [&](double share) { notify("refine", 0.05 + 0.9 * share); }, result.rig, result.report);
-        settle_refit(attempt, result);
+        settle_refit(attempt, make_level(*attempt.images, 1, result.rig, options.num_threads),
+                     result);
     } else {
         notify("search", 0.05);
         const CalibrationResult empty = result;
@@ -269,6 +272,16 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     result.report.time = images->times->seconds(resolve_threads(options.num_threads));
     result.report.time.search = search_seconds;
     return result;
+}
+
+void CalibrationResult::distrust(const std::string& reason, const std::string& advice) {
+    Verdict& verdict = report.verdict;
+    const std::string line = reason + (advice.empty() ? "" : "; " + advice);
+    report.message = verdict.trusted ? line : report.message + "; " + line;
+    verdict.reason = verdict.trusted ? reason : verdict.line() + "; " + reason;
+    verdict.advice = advice;
+    verdict.trusted = report.converged = converged = false;
+    rig.verdict = std::make_shared<const Verdict>(verdict);
 }
 
 CalibrationResult calibrate(const std::vector<ImageView>& references,

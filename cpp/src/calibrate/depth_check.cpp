@@ -8,6 +8,7 @@
 #include "base/format.hpp"
 #include "base/median.hpp"
 #include "base/parallel.hpp"
+#include "calibrate/static_edges.hpp"
 #include "geometry/projector.hpp"
 #include "solve/solve.hpp"
 
@@ -75,18 +76,48 @@ double standard_error(const std::vector<double>& a, const std::vector<double>& b
     return std::sqrt(sum / (count * std::max(1.0, count - 1)));
 }
 
+// Inverse depth is linear over a plane: does it bend anywhere else than at an edge or two?
+bool is_plane(const Image& depth) {
+    constexpr double kBend = 0.005, kShare = 0.03;
+    const auto inverse = [&](int x, int y) { return 1.0 / depth.row(y)[x]; };
+    int known = 0, bent = 0;
+    for (int y = 1; y + 1 < depth.height; ++y)
+        for (int x = 1; x + 1 < depth.width; ++x) {
+            const double here = inverse(x, y);
+            const double across = inverse(x - 1, y) + inverse(x + 1, y) - 2 * here,
+                         down = inverse(x, y - 1) + inverse(x, y + 1) - 2 * here;
+            if (!std::isfinite(across + down)) continue;  // 0 is unknown
+            ++known;
+            bent += std::max(std::abs(across), std::abs(down)) > kBend * here;
+        }
+    return bent < kShare * known;
+}
+
+// One map of a scene for all frames of a camera that moves.
+bool one_depth_for_all(const WorkingImages& images) {
+    const std::vector<Image>& depths = images.pyramid.at(kFactor).depths;
+    for (const Image& depth : depths)
+        if (depth.pixels != depths[0].pixels) return false;
+    return depths.size() > 1 && !is_plane(depths[0]) && !camera_stands_still(images);
+}
+
 // How well edges agree after a short fit from the rig, coarse before fine.
-double refitted(const WorkingImages& images, Rig rig, const Plan& plan) {
+struct Refitted {
+    double coarse = 0, fine = 0;
+};
+Refitted refitted(const WorkingImages& images, Rig rig, const Plan& plan, double hopeless) {
     constexpr int kIterations = 12;
     Plan quick = plan;
     quick.options.max_iterations = std::min(plan.options.max_iterations, kIterations);
-    double aligned = 0;
-    for (const int factor : {kCoarse, kFactor}) {
+    const auto solve = [&](int factor) {
         const Level level = make_level(images, factor, rig, plan.options.num_threads);
         const double share = pooled(level, rig, plan.options.num_threads).valid_share;
-        aligned = solve_level(level, {}, 2, share_limit(share), 1e-4, quick, rig, rig).aligned;
-    }
-    return aligned;
+        return solve_level(level, {}, 2, share_limit(share), 1e-4, quick, rig, rig).aligned;
+    };
+    Refitted out;
+    out.coarse = solve(kCoarse);
+    if (out.coarse > hopeless) out.fine = solve(kFactor);
+    return out;
 }
 
 }  // namespace
@@ -114,6 +145,7 @@ DepthCheck check_depth(const WorkingImages& images, const Rig& rig, const Plan& 
     out.exchanged = mean(other);
     for (std::size_t i = 0; i < run.size(); ++i) out.exchangeable |= own[i] != other[i];
     out.exchange_error = standard_error(own, other);
+    out.one_for_all = one_depth_for_all(images);
     for (const bool next : {true, false}) {
         const std::vector<double> beside =
             with_depth_of(run, next ? 1 : run.size() - 1, rig, num_threads);
@@ -124,10 +156,17 @@ DepthCheck check_depth(const WorkingImages& images, const Rig& rig, const Plan& 
     }
 
     const WorkingImages few = images.spread(kFrames);
-    out.refitted = refitted(few, rig, plan);
-    out.none = refitted(with_each_depth(few, [&](float) { return 1 / middle; }), rig, plan);
-    out.inverse = refitted(with_each_depth(few, [&](float z) { return 1 / (middle * middle * z); }),
-                           rig, plan);
+    const Refitted given = refitted(few, rig, plan, 0);
+    out.refitted = given.fine;
+    // What coarse edges agree with clearly less, fine ones do too.
+    const double hopeless = 0.95 * given.coarse;
+    const auto instead = [&](const auto& change) {
+        return refitted(with_each_depth(few, change), rig, plan, hopeless).fine;
+    };
+    out.none = instead([&](float) { return 1 / middle; });
+    // Relative depth is an inverse depth of unknown shift: its inverse says nothing.
+    if (!plan.options.relative_depth)
+        out.inverse = instead([&](float z) { return 1 / (middle * middle * z); });
     return out;
 }
 
@@ -138,6 +177,9 @@ std::optional<Objection> wrong_depth(const DepthCheck& check) {
     if (check.relief < kRelief)
         return Objection{"every depth is the same: the rig holds for things at that distance only",
                          "give the depth of each pixel; see docs/inputs.md for where to get it"};
+    if (check.one_for_all)
+        return Objection{"all frames have the same depth map, though the camera moves",
+                         "give each frame its own depth"};
     if (check.inverse > (1 + kGain) * check.refitted)
         return Objection{
             format("inverse depth fits better than the given depth: edges agree by %.3f, not %.3f",

@@ -14,12 +14,15 @@ struct DepthCheck {
     // and with that of a frame some way off.
     double own = 0.0, exchanged = 0.0;
     bool exchangeable = false;  // they differ from frame to frame
+    // One map for all frames, in which things stand, though the camera moves past them. (A road
+    // plane is one map too, and means it.)
+    bool one_for_all = false;
     double exchange_error =
         0.0;  // standard error of their difference, from its scatter over frames
     double beside = 0.0, beside_error = 0.0;  // the better of the two neighbours' depth
     bool beside_is_next = false;
     // The same on some frames, each after a short fit: with one depth everywhere, and with inverse
-    // depth in place of depth.
+    // depth in place of depth; 0 where coarse edges show already that it is less.
     double refitted = 0.0, none = 0.0, inverse = 0.0;
     double parallax_px = 0.0;  // what the depths from 5 to 95 % move [px at 640 px of width]
     double relief = 0.0;       // the range from 5 to 95 % of inverse depths, over their median

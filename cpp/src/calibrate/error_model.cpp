@@ -20,71 +20,125 @@ constexpr double kUnitWidth = 640;  // [px] of the reference, in whose pixels er
 
 // A frame tells of some directions only: so much of what all say goes to every direction alike.
 constexpr double kShrinkage = 0.3;
-// Measured on rendered rigs whose truth is known (docs/trust.md), as are the two below: true over
-// predicted deviation,
-constexpr double kScale = 1.2;
-// what all frames share and neither source sees [working px],
-constexpr double kFloor = 0.08;
+// Measured on rigs whose truth is known (docs/trust.md), as are those below: shares of the squared
+// error that the gradients' scatter predicts, that halves which lie apart show, and that the lens
+// which was not estimated would make,
+constexpr double kPredicted = 1.0, kApart = 0.2, kMissed = 0.5;
+// what all frames share and none of these sees [working px],
+constexpr double kFloor = 0.02;
 // and the degrees of freedom of the error's distribution, of which the tails are heavier than a
 // Gaussian's since the deviation itself is an estimate.
-constexpr double kFreedom = 5.0;
+constexpr double kFreedom = 4.0;
+// Standard deviations of k1 and k2 of lenses, which stand in for what was not estimated.
+constexpr double kLens[] = {0.2, 0.1};
 
-// What each frame says of a fit to all of them.
+// What each frame says of a fit to all of them, by the directions in which a rig could be wrong.
 struct Evidence {
-    std::vector<int> parameters;             // those that were free
     Eigen::MatrixXd hessian;                 // of all frames
     std::vector<Eigen::VectorXd> gradients;  // of each
+
+    Eigen::VectorXd sum() const {
+        Eigen::VectorXd sum = Eigen::VectorXd::Zero(hessian.rows());
+        for (const Eigen::VectorXd& gradient : gradients) sum += gradient;
+        return sum;
+    }
 };
 
-Evidence evidence_of(const WorkingImages& images, const Rig& rig, const Plan& plan) {
+Evidence evidence_of(const Level& level, const Rig& rig, const Directions& directions,
+                     int num_threads) {
     constexpr double kLeastCurvature = 0.01;  // as in NecCost
-    const int num_threads = plan.options.num_threads;
-    const Level level = make_level(images, 1, rig, num_threads);
     const Rig at_level = level.rig_at(rig);
-    const Parameters free = free_parameters(2, plan.options);
     const std::size_t count = level.pairs.size();
     std::vector<Eigen::MatrixXd> hessians(count);
     Evidence out;
     out.gradients.resize(count);
+    const Eigen::MatrixXd& basis = directions.basis;
     parallel_each(static_cast<int>(count), num_threads, [&](int i) {
         const ImagePair& pair = *level.pairs[i];
-        const NecNormalEquations equations = pair.normal_equations(at_level, free);
+        const NecNormalEquations equations = pair.normal_equations(at_level, directions.parameters);
         const double curvature = std::max(pair.curvature(equations.value), kLeastCurvature);
-        hessians[i] = level.weights[i] * curvature * equations.hessian;
-        out.gradients[i] = level.weights[i] * equations.gradient;
+        hessians[i] = level.weights[i] * curvature * basis.transpose() * equations.hessian * basis;
+        out.gradients[i] = level.weights[i] * basis.transpose() * equations.gradient;
     });
-    out.hessian = Eigen::MatrixXd::Zero(free.size(), free.size());
+    out.hessian = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
     for (const Eigen::MatrixXd& hessian : hessians) out.hessian += hessian;
-    for (int i = 0; i < free.size(); ++i) out.parameters.push_back(free[i]);
     return out;
 }
 
-// H^-1 (sum of g g^T) H^-1: how the fit would scatter if the frames were drawn again. The g scatter
-// about their mean, which is 0 at the optimum but for what the last step left.
-Eigen::MatrixXd covariance_of(const Evidence& evidence) {
-    const Eigen::MatrixXd& hessian = evidence.hessian;
-    const Eigen::Index size = hessian.rows();
-    const double count = static_cast<double>(evidence.gradients.size());
-    if (size == 0 || count < 2) return Eigen::MatrixXd::Zero(size, size);
-    // In units in which every parameter bends the cost alike.
+// W with W W^T = H^-1: in its columns every direction bends the cost alike.
+Eigen::MatrixXd whitening_of(const Eigen::MatrixXd& hessian) {
     const Eigen::VectorXd unit = hessian.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * hessian *
                                                                unit.asDiagonal());
     const Eigen::VectorXd values =
-        eigen.eigenvalues().cwiseMax(1e-8 * eigen.eigenvalues()[size - 1]);
-    const Eigen::MatrixXd whitening =
-        unit.asDiagonal() * eigen.eigenvectors() * values.cwiseSqrt().cwiseInverse().asDiagonal();
-    Eigen::VectorXd mean = Eigen::VectorXd::Zero(size);
-    for (const Eigen::VectorXd& gradient : evidence.gradients) mean += gradient / count;
-    Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(size, size);
+        eigen.eigenvalues().cwiseMax(1e-8 * eigen.eigenvalues()[hessian.rows() - 1]);
+    return unit.asDiagonal() * eigen.eigenvectors() *
+           values.cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
+// Covariance of the sum of the gradients, in those columns, by how they scatter about their mean,
+// which is 0 at the optimum but for what the last step left.
+Eigen::MatrixXd scatter_of(const Evidence& evidence, const Eigen::MatrixXd& whitening) {
+    const double count = static_cast<double>(evidence.gradients.size());
+    const Eigen::VectorXd mean = evidence.sum() / count;
+    Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(mean.size(), mean.size());
     for (const Eigen::VectorXd& gradient : evidence.gradients) {
         const Eigen::VectorXd step = whitening.transpose() * (gradient - mean);
         scatter += step * step.transpose() * count / (count - 1);
     }
+    return scatter;
+}
+
+// What the frames say of where the truth lies.
+struct Estimate {
+    Eigen::VectorXd step;  // from the rig to the middle of it, by what was not estimated
+    Eigen::MatrixXd covariance;
+};
+
+// (H + sP)^-1 (S + s^2 P) (H + sP)^-1, with S the covariance of the gradient, P what is known of
+// lenses, and s what makes S of H: how the fit would scatter if the frames were drawn again.
+Estimate estimate_of(const Evidence& evidence, const Eigen::VectorXd& prior) {
+    const Eigen::Index size = evidence.hessian.rows();
+    if (size == 0 || evidence.gradients.size() < 2)
+        return {Eigen::VectorXd::Zero(size), Eigen::MatrixXd::Zero(size, size)};
+    const double noise =
+        scatter_of(evidence, whitening_of(evidence.hessian)).trace() / static_cast<double>(size);
+    Eigen::MatrixXd hessian = evidence.hessian;
+    hessian.diagonal() += noise * prior;
+    const Eigen::MatrixXd whitening = whitening_of(hessian);
+    Eigen::MatrixXd scatter = scatter_of(evidence, whitening);
     const double mean_scatter = scatter.trace() / static_cast<double>(size);
     scatter *= 1 - kShrinkage;
     scatter.diagonal().array() += kShrinkage * mean_scatter;
-    return whitening * scatter * whitening.transpose();
+    scatter += noise * noise * whitening.transpose() * prior.asDiagonal() * whitening;
+    const Eigen::VectorXd held = (prior.array() > 0).select(evidence.sum(), 0.0);
+    return {-whitening * (whitening.transpose() * held),
+            whitening * scatter * whitening.transpose()};
+}
+
+// What moved in the last solve, and the lens of the source where it was to be estimated and moved
+// by less.
+Directions directions_of(const Rig& rig, const Plan& plan) {
+    const Moving moving = moving_parameters(2, 1, plan, rig);
+    Directions out;
+    std::vector<std::pair<int, int>> entries;  // parameter's place, direction
+    std::vector<double> prior;
+    for (int i = 0; i < moving.parameters.size(); ++i) {
+        out.parameters.add(moving.parameters[i]);
+        const bool with_last = moving.focal_together && moving.parameters[i] == kReferenceLogFy;
+        if (!with_last) prior.push_back(0);
+        entries.emplace_back(i, static_cast<int>(prior.size()) - 1);
+    }
+    if (plan.estimates_lens && has_lens_parameters(rig.source.lens))
+        for (int k = moving.lens_coefficients; k < 2; ++k) {
+            entries.emplace_back(out.parameters.size(), static_cast<int>(prior.size()));
+            out.parameters.add(kSourceK1 + k);
+            prior.push_back(1 / (kLens[k] * kLens[k]));
+        }
+    out.basis = Eigen::MatrixXd::Zero(out.parameters.size(), static_cast<int>(prior.size()));
+    for (const auto& [place, direction] : entries) out.basis(place, direction) = 1;
+    out.prior = Eigen::Map<const Eigen::VectorXd>(prior.data(), static_cast<int>(prior.size()));
+    return out;
 }
 
 // Errors longer than `length`, whose axes have the deviation `deviation`: Student's t in the plane.
@@ -115,8 +169,8 @@ ExpectedError expected_error(const std::vector<double>& deviations) {
     return {quantile_of(deviations, 0.5), quantile_of(deviations, 0.95)};
 }
 
-ErrorModel::ErrorModel(const WorkingImages& images, const Rig& rig, const Halves& halves,
-                       const Plan& plan)
+ErrorModel::ErrorModel(const WorkingImages& images, const Level& finest, const Rig& rig,
+                       const Halves& halves, const Plan& plan)
     : rig_(rig), halves_(halves) {
     const double reduction = rig.reference.width / static_cast<double>(images.references[0].width);
     unit_ = kUnitWidth / rig.reference.width / rig.source_density().x();
@@ -124,9 +178,11 @@ ErrorModel::ErrorModel(const WorkingImages& images, const Rig& rig, const Halves
     const auto frames = halves_of(images.size());
     const double count = static_cast<double>(images.size());
     disagreement_ = static_cast<double>(frames[0].size() * frames[1].size()) / (count * count);
-    const Evidence evidence = evidence_of(images, rig, plan);
-    parameters_ = evidence.parameters;
-    covariance_ = covariance_of(evidence);
+    directions_ = directions_of(rig, plan);
+    const Estimate estimate = estimate_of(
+        evidence_of(finest, rig, directions_, plan.options.num_threads), directions_.prior);
+    step_ = estimate.step;
+    covariance_ = estimate.covariance;
     motion_ = Eigen::MatrixXd::Zero(covariance_.rows(), covariance_.cols());
 
     constexpr int kStep = 16;
@@ -148,10 +204,10 @@ ErrorModel::ErrorModel(const WorkingImages& images, const Rig& rig, const Halves
 
 Eigen::MatrixXd ErrorModel::jacobian_at(double x, double y, double depth) const {
     const Eigen::Matrix<double, 2, kNumParameters> all = warp_jacobian(rig_, x, y, depth);
-    Eigen::MatrixXd jacobian(2, parameters_.size());
-    for (std::size_t i = 0; i < parameters_.size(); ++i)
-        jacobian.col(static_cast<Eigen::Index>(i)) = all.col(parameters_[i]);
-    return jacobian;
+    Eigen::MatrixXd jacobian(2, directions_.parameters.size());
+    for (int i = 0; i < directions_.parameters.size(); ++i)
+        jacobian.col(i) = all.col(directions_.parameters[i]);
+    return jacobian * directions_.basis;
 }
 
 double ErrorModel::deviation(double x, double y, double inverse_depth) const {
@@ -163,9 +219,10 @@ double ErrorModel::deviation(double x, double y, double inverse_depth) const {
     const double apart =
         (transfer(*halves_.rigs[0], x, y, depth) - transfer(*halves_.rigs[1], x, y, depth))
             .squaredNorm();
-    const double variance = 0.5 * (predicted + disagreement_ * apart) / 2;
-    return std::isfinite(variance) ? std::hypot(kScale * unit_ * std::sqrt(variance), floor_)
-                                   : infinite;
+    const double missed = (jacobian * step_).squaredNorm();
+    const double variance =
+        (kPredicted * predicted + kApart * disagreement_ * apart + kMissed * missed) / 2;
+    return std::isfinite(variance) ? std::hypot(unit_ * std::sqrt(variance), floor_) : infinite;
 }
 
 double ErrorModel::length(double x, double y, double inverse_depth, double share) const {
@@ -229,7 +286,8 @@ std::vector<std::string> ErrorModel::weak_directions() const {
                           {kSourceCx, "cx", "px", width, 0.005 * width},
                           {kSourceCy, "cy", "px", height, 0.005 * height},
                           {kRotationX, "tilt", "deg", 57.29577951308232, 0.2},
-                          {kRotationY, "pan", "deg", 57.29577951308232, 0.2}};
+                          {kRotationY, "pan", "deg", 57.29577951308232, 0.2},
+                          {kSourceK1, "k1", "", 1, 0.02}};
     constexpr double kMoves = 0.1;  // [px]
     std::vector<std::string> out;
     if (over_footage_.empty()) return out;
@@ -241,20 +299,17 @@ std::vector<std::string> ErrorModel::weak_directions() const {
         unit.asDiagonal() *
         (scaled + 1e-10 * Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())).inverse() *
         unit.asDiagonal();
-    const auto index_of = [&](int parameter) {
-        return std::find(parameters_.begin(), parameters_.end(), parameter) - parameters_.begin();
-    };
     for (const Name& first : names) {
-        const Eigen::Index i = index_of(first.parameter);
-        if (i == inverse.rows()) continue;
+        const Eigen::Index i = directions_.of(first.parameter);
+        if (i < 0) continue;
         const double slide = kMoves * std::sqrt(std::max(0.0, inverse(i, i)));
         if (slide * first.to_unit < first.noticeable) continue;
         // The rest moves so that the pixels move least.
         const Name* with = nullptr;
         double most = 0, by = 0;
         for (const Name& second : names) {
-            const Eigen::Index k = index_of(second.parameter);
-            if (k == inverse.rows() || k == i) continue;
+            const Eigen::Index k = directions_.of(second.parameter);
+            if (k < 0 || k == i) continue;
             const double moves = slide * inverse(k, i) / inverse(i, i);
             const double notice = std::abs(moves) * second.to_unit / second.noticeable;
             if (notice <= most) continue;
@@ -272,12 +327,18 @@ std::vector<std::string> ErrorModel::weak_directions() const {
 }
 
 double ErrorModel::deviation_of(int parameter) const {
-    for (std::size_t i = 0; i < parameters_.size(); ++i)
-        if (parameters_[i] == parameter) {
-            const Eigen::Index at = static_cast<Eigen::Index>(i);
-            return kScale * std::sqrt(std::max(0.0, covariance_(at, at)));
+    const Eigen::Index at = directions_.of(parameter);
+    return at < 0 ? 0.0 : std::sqrt(kPredicted * std::max(0.0, covariance_(at, at)));
+}
+
+Eigen::Index Directions::of(int parameter) const {
+    for (int i = 0; i < parameters.size(); ++i)
+        if (parameters[i] == parameter) {
+            Eigen::Index direction = 0;
+            basis.row(i).maxCoeff(&direction);
+            return direction;
         }
-    return 0.0;
+    return -1;
 }
 
 }  // namespace xcalib

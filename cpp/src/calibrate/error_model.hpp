@@ -2,8 +2,8 @@
 //
 // Two sources, neither of which knows the truth: how much each frame by itself would move the fit
 // (the covariance of the normal equations, by their gradients), and how far two calibrations that
-// share no frame lie apart. The first knows every direction in which a rig can move, the second
-// every other thing that goes wrong.
+// share no frame lie apart. The first knows every direction in which a rig can move, among them
+// the lens of its source where none was kept, the second every other thing that goes wrong.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,13 +12,25 @@
 
 #include "calibrate/halves.hpp"
 #include "solve/working_images.hpp"
+#include "xcalib/parameters.hpp"
 #include "xcalib/verdict.hpp"
 
 namespace xcalib {
 
+// The directions in which a rig may be off, by its parameters.
+struct Directions {
+    Parameters parameters = Parameters(0);
+    Eigen::MatrixXd basis;  // parameters x directions: those that move together share one
+    Eigen::VectorXd prior;  // what is known beforehand of each, inverse variances; mostly nothing
+
+    Eigen::Index of(int parameter) const;  // -1 where it is held
+};
+
 class ErrorModel {
    public:
-    ErrorModel(const WorkingImages& images, const Rig& rig, const Halves& halves, const Plan& plan);
+    // `finest`: the level of all images that the rig was solved at last.
+    ErrorModel(const WorkingImages& images, const Level& finest, const Rig& rig,
+               const Halves& halves, const Plan& plan);
 
     // Of a pixel at a depth, along each axis [px of the reference when its width is 640 px].
     double deviation(double x, double y, double inverse_depth) const;
@@ -43,7 +55,7 @@ class ErrorModel {
     double deviation_of(int parameter) const;
 
    private:
-    // dT/dp by the parameters that were free.
+    // dT by the directions.
     Eigen::MatrixXd jacobian_at(double x, double y, double depth) const;
 
     Rig rig_;
@@ -51,7 +63,8 @@ class ErrorModel {
     double unit_;          // to px of the reference at 640 px of width, from px of the source
     double floor_;         // [the same]
     double disagreement_;  // share of the halves' squared distance that the fit to all has
-    std::vector<int> parameters_;
+    Directions directions_;
+    Eigen::VectorXd step_;              // to where the frames would have it, by the directions
     Eigen::MatrixXd covariance_;        // of them
     Eigen::MatrixXd motion_;            // mean of J^T J over the footage [px^2]
     std::vector<double> over_footage_;  // deviations

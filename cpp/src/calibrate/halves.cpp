@@ -14,6 +14,19 @@ namespace {
 // Half resolution: fine enough to separate a fit from a near miss, a quarter of the cost.
 constexpr int kFactor = 2;
 
+// Each half is searched on so many of its frames: two that agree are safer than one search of all.
+constexpr std::size_t kHalfFrames = 6;
+
+// From some of the half's frames to all of them. Half resolution is enough to tell whether two
+// halves agree; what the finest level adds, the gradients of its frames show (error_model.hpp).
+void refine_half(const WorkingImages& half, const Plan& plan, Start& start) {
+    if (half.size() <= kHalfFrames || start.levels.back().factor != kFactor) return;
+    const Level level = make_level(half, kFactor, start.rig, plan.options.num_threads);
+    const double limit =
+        share_limit(pooled(level, start.rig, plan.options.num_threads).valid_share);
+    start.levels.push_back(solve_stage(half, level, 2, limit, 1e-5, plan, start.rig));
+}
+
 }  // namespace
 
 std::array<std::vector<std::size_t>, 2> halves_of(std::size_t count) {
@@ -25,7 +38,7 @@ std::array<std::vector<std::size_t>, 2> halves_of(std::size_t count) {
 }
 
 Halves fit_halves(const WorkingImages& images, const ImageView& reference, const ImageView& source,
-                  const std::optional<Rig>& initial, const Plan& plan, const Refine& refine,
+                  const std::optional<Rig>& initial, const Plan& plan,
                   const std::function<void(double)>& progress) {
     Halves out;
     if (images.size() < 2) return out;
@@ -35,8 +48,9 @@ Halves fit_halves(const WorkingImages& images, const ImageView& reference, const
         const WorkingImages half = images.subset(halves_of(images.size())[k]);
         const auto notify = [&](double share) { progress(0.5 * (static_cast<double>(k) + share)); };
         try {
-            Start start = find_start(half, reference, source, initial, plan, notify);
-            refine(half, start);
+            Start start =
+                find_start(half.spread(kHalfFrames), reference, source, initial, plan, notify);
+            refine_half(half, plan, start);
             out.rigs[k] = start.rig;
             // The start of all frames is judged on all of them.
             const double here = merit_on(images, start.rig, plan);
@@ -68,7 +82,8 @@ Halves refit_halves(const WorkingImages& images, const Rig& rig, const Plan& pla
 
 double merit_on(const WorkingImages& images, const Rig& rig, const Plan& plan) {
     const int num_threads = plan.options.num_threads;
-    return merit(pooled(make_level(images, kFactor, rig, num_threads), rig, num_threads));
+    const Level level = make_level(images.spread(kStartFrames), kFactor, rig, num_threads);
+    return merit(pooled(level, rig, num_threads));
 }
 
 bool agree(const Halves& halves, const WorkingImages& images) {

@@ -10,9 +10,6 @@
 
 namespace xcalib {
 
-// Refines a start on the given frames, as all frames are: its rig and levels.
-using Refine = std::function<void(const WorkingImages&, Start&)>;
-
 struct Halves {
     std::array<std::optional<Rig>, 2> rigs;  // none where the search found nothing
     std::optional<Start> start;              // of the better half; none with one pair
@@ -22,10 +19,10 @@ struct Halves {
 // The frames of the two halves, in blocks: neighbours look alike, and stand in one half.
 std::array<std::vector<std::size_t>, 2> halves_of(std::size_t count);
 
-// Each half searched, placed and refined by itself. `reference` and `source` give the sizes of the
-// cameras.
+// Each half searched, placed and refined by itself, up to half resolution. `reference` and `source`
+// give the sizes of the cameras.
 Halves fit_halves(const WorkingImages& images, const ImageView& reference, const ImageView& source,
-                  const std::optional<Rig>& initial, const Plan& plan, const Refine& refine,
+                  const std::optional<Rig>& initial, const Plan& plan,
                   const std::function<void(double)>& progress);
 
 // Both halves from a rig of all frames, where nothing was searched: what they show is precision.
@@ -37,7 +34,7 @@ Halves refit_halves(const WorkingImages& images, const Rig& rig, const Plan& pla
 inline constexpr double kFarthest = 0.016;
 bool agree(const Halves& halves, const WorkingImages& images);
 
-// How well the edges of all frames agree at a rig, at half resolution.
+// How well edges agree at a rig, at half resolution, on frames from all of the footage.
 double merit_on(const WorkingImages& images, const Rig& rig, const Plan& plan);
 
 // Median distance between the halves over the footage [working px]; infinite where one has no rig.

@@ -61,6 +61,7 @@ Rig with_shifted_depth(const Rig& rig, double shift) {
     const Eigen::Matrix3d inverse = U.inverse();
     Rig out = rig;
     out.source = Pinhole::from_K(rig.source.width, rig.source.height, U);
+    out.source.lens = rig.source.lens;  // which makes it approximate
     out.source_from_reference.rotation = Eigen::Quaterniond(inverse * A).normalized();
     out.source_from_reference.translation = inverse * K * rig.t();
     return out;

@@ -29,6 +29,8 @@ struct DirectionMap {
     }
 };
 
+constexpr double kSteepest = 6;  // tangent of the tilt that maps end at: 80 deg
+
 // The map that holds the camera's whole image, at the given step.
 DirectionMap map_for(const Pinhole& camera, double step) {
     const Pinhole::Field field = camera.field();
@@ -36,8 +38,9 @@ DirectionMap map_for(const Pinhole& camera, double step) {
     map.step = step;
     map.width =
         2 * static_cast<int>(std::ceil(std::atan(std::max(-field.left, field.right)) / step)) + 1;
-    map.height =
-        2 * static_cast<int>(std::ceil(std::asinh(std::max(-field.top, field.bottom)) / step)) + 1;
+    // Mercator's ordinate grows without end: a fisheye's border is left out.
+    const double steepest = std::min(kSteepest, std::max(-field.top, field.bottom));
+    map.height = 2 * static_cast<int>(std::ceil(std::asinh(steepest) / step)) + 1;
     return map;
 }
 
@@ -63,10 +66,11 @@ MapSampler map_sampler(const DirectionMap& map, const Pinhole& camera,
             if (!(p.x() >= 0 && p.x() <= camera.width - 1 && p.y() >= 0 &&
                   p.y() <= camera.height - 1))
                 continue;
+            const Eigen::Vector2d beside = project(camera, camera_from_map * map.ray(x + 1, y)) - p;
+            if (!beside.allFinite()) continue;  // the lens shows nothing there
             const std::size_t i = static_cast<std::size_t>(y) * map.width + x;
             sampler.u[i] = static_cast<float>(p.x());
             sampler.v[i] = static_cast<float>(p.y());
-            const Eigen::Vector2d beside = project(camera, camera_from_map * map.ray(x + 1, y)) - p;
             const Complex direction(static_cast<float>(beside.x() / beside.norm()),
                                     static_cast<float>(-beside.y() / beside.norm()));
             sampler.turn[i] = product(direction, direction);
@@ -275,12 +279,16 @@ double distance(const Rig& a, const Rig& b) {
         return project(rig.source, rig.R() * unproject(rig.reference, x, y, 1));
     };
     double sum = 0;
+    int count = 0;
     for (double y : {0.3, 0.5, 0.7})
         for (double x : {0.3, 0.5, 0.7}) {
             const double u = x * a.reference.width, v = y * a.reference.height;
-            sum += (far(a, u, v) - far(b, u, v)).norm();
+            const double apart = (far(a, u, v) - far(b, u, v)).norm();
+            if (std::isnan(apart)) continue;  // a lens shows nothing there
+            sum += apart;
+            ++count;
         }
-    return sum / 9 / a.source.width;
+    return count > 0 ? sum / count / a.source.width : 1;
 }
 
 }  // namespace

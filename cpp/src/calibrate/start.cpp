@@ -18,9 +18,15 @@ Pinhole camera_guess(const ImageView& image, double hfov) {
     return Pinhole::from_hfov(image.width, image.height, hfov);
 }
 
+// The same camera with a lens that is given; none given, with its own.
+Pinhole with_lens(Pinhole camera, const std::optional<Lens>& lens) {
+    if (lens) camera.lens = *lens;
+    return camera;
+}
+
 // Where the field of view of the reference makes little difference, it is the paper's 45 deg.
 double preference(const Rig& rig) {
-    const double ratio = std::log(rig.reference.field().width() / (2 * std::tan(22.5 * kDegree)));
+    const double ratio = std::log(rig.reference.width_by_focal() / (2 * std::tan(22.5 * kDegree)));
     return 1 - 0.12 * std::abs(ratio);
 }
 
@@ -135,7 +141,7 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal, co
                 [&](int i) {
                     const double focal = paper * std::pow(1.2, i - 5);
                     return with_reference_focal(from, mount,
-                                                focal * from.reference.field().width());
+                                                focal * from.reference.width_by_focal());
                 },
                 candidate);
         }
@@ -163,6 +169,31 @@ void place(const Level& level, const InverseDepths& inverse, bool free_focal, co
     }
 }
 
+// The same rig with k1 in its source's lens: what lies half-way to the sides of the image stays.
+Rig with_k1(const Rig& rig, double k1) {
+    const double shown = 0.3 * rig.source.field().width();
+    const double radius =
+        rig.source.lens.undistort({shown, 0}).value_or(Eigen::Vector2d(shown, 0)).x();
+    Rig out = rig;
+    out.source.lens = k1 == 0 ? Lens() : Lens(LensModel::brown, {k1, 0, 0, 0});
+    out.source = out.source.zoomed(shown / (radius * (1 + k1 * radius * radius)));
+    return out;
+}
+
+// A pinhole hardly finds what a strong lens shows: a few are tried.
+void try_lenses(const Level& level, const Plan& plan, Candidate& candidate) {
+    if (!plan.estimates_lens) return;
+    constexpr double kStep = -0.1, kCost = 0.1;
+    constexpr int kCount = 5;
+    const Rig from = candidate.rig;
+    std::vector<double> merits(kCount);
+    parallel_each(kCount, plan.options.num_threads, [&](int i) {
+        merits[i] = (1 + kCost * kStep * i) * merit(pooled(level, with_k1(from, kStep * i), 1));
+    });
+    const auto best = std::max_element(merits.begin(), merits.end()) - merits.begin();
+    candidate.rig = with_k1(from, kStep * static_cast<double>(best));
+}
+
 // Keeps the best `count`, best first.
 void keep_best(std::vector<Candidate>& candidates, std::size_t count) {
     std::stable_sort(candidates.begin(), candidates.end(),
@@ -186,30 +217,35 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
     } else if (initial) {
         cameras = {initial->reference};
     } else if (options.reference_hfov_deg) {
-        cameras = {camera_guess(reference, *options.reference_hfov_deg * kDegree)};
+        cameras = {Pinhole::from_hfov(reference.width, reference.height,
+                                      *options.reference_hfov_deg * kDegree,
+                                      options.reference_lens.value_or(Lens()))};
     } else {
         for (double hfov : {60.0, 40.0, 82.0})
             cameras.push_back(camera_guess(reference, hfov * kDegree));
     }
+    for (Pinhole& camera : cameras) camera = with_lens(camera, options.reference_lens);
     for (const Pinhole& camera : cameras) {
         SearchHypothesis hypothesis{camera, {}};
         if (options.source_camera) {
             hypothesis.sources = {*options.source_camera};
         } else {
-            // Fields of view are compared by their tangents, as focal lengths are.
+            // Fields of view are compared by their tangents, as focal lengths are, lenses aside.
             const Pinhole& centre = local ? initial->source : camera;
             const double ratio = local ? 1.15 : options.search.max_fov_ratio;
             const double widest = std::tan(60 * kDegree);
             const int steps = static_cast<int>(std::ceil(std::log(ratio) / std::log(scale_step)));
             for (int i = -steps; i <= steps; ++i) {
                 const double scale = std::pow(ratio, static_cast<double>(i) / steps);
-                const double tangent = scale * std::tan(centre.hfov() / 2);
+                const double tangent = scale * centre.width_by_focal() / 2;
                 if (tangent > widest) continue;
                 Pinhole guess = camera_guess(source, 2 * std::atan(tangent));
+                if (initial) guess.lens = initial->source.lens;
                 if (local) guess = initial->source.zoomed(1 / scale);
                 hypothesis.sources.push_back(guess);
             }
         }
+        for (Pinhole& guess : hypothesis.sources) guess = with_lens(guess, options.source_lens);
         space.hypotheses.push_back(hypothesis);
     }
     const double max_roll = (local ? 3.0 : options.search.max_roll_deg) * kDegree;
@@ -244,20 +280,23 @@ Rig given_start(const ImageView& reference, const ImageView& source,
     if (initial) {
         rig = *initial;
     } else {
-        rig.reference = camera_guess(reference, options.reference_hfov_deg.value_or(45) * kDegree);
+        rig.reference = Pinhole::from_hfov(reference.width, reference.height,
+                                           options.reference_hfov_deg.value_or(45) * kDegree,
+                                           options.reference_lens.value_or(Lens()));
         rig.source = camera_guess(source, 45 * kDegree);
     }
-    rig.reference = options.reference_camera.value_or(rig.reference);
-    rig.source = options.source_camera.value_or(rig.source);
+    rig.reference =
+        with_lens(options.reference_camera.value_or(rig.reference), options.reference_lens);
+    rig.source = with_lens(options.source_camera.value_or(rig.source), options.source_lens);
     return rig;
 }
 
 Start find_start(const WorkingImages& all_images, const ImageView& reference,
                  const ImageView& source, const std::optional<Rig>& initial, const Plan& plan,
                  const std::function<void(double)>& progress) {
-    constexpr std::size_t kFrames = 8, kFew = 6;
+    constexpr std::size_t kFew = 6;
     const CalibrationOptions& options = plan.options;
-    const WorkingImages images = all_images.spread(kFrames);
+    const WorkingImages images = all_images.spread(kStartFrames);
     const int num_threads = options.num_threads;
     const double start = seconds_now();
     Start out;
@@ -323,6 +362,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
             keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
+            if (plan.searches && steps[s].factor >= kCoarse && steps[s].stage == 2)
+                try_lenses(level, plan, candidate);
             candidate.levels.push_back(
                 plan.searches && plan.parts.images
                     ? solve_level(level, {}, steps[s].stage, candidate.share_limit, kTolerance,

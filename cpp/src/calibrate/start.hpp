@@ -53,6 +53,9 @@ struct Start {
 Rig given_start(const ImageView& reference, const ImageView& source,
                 const std::optional<Rig>& initial, const CalibrationOptions& options);
 
+// Of more frames than these, so many are looked at.
+inline constexpr std::size_t kStartFrames = 8;
+
 // `reference` and `source` give the sizes of the cameras. Throws NothingFound.
 Start find_start(const WorkingImages& images, const ImageView& reference, const ImageView& source,
                  const std::optional<Rig>& initial, const Plan& plan,

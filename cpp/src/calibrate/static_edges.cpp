@@ -9,6 +9,8 @@
 namespace xcalib {
 namespace {
 
+constexpr double kStandsStill = 0.2;  // share of the edges beyond which the camera does
+
 // A mask of the static pixels, grown by `reach` px, that covers a pixel of a level where it covers
 // a part of it.
 struct Mask {
@@ -23,16 +25,13 @@ struct Mask {
     }
 };
 
-}  // namespace
+struct StillEdges {
+    Mask mask;
+    double share;  // of all edges
+};
 
-WorkingImages without_static_edges(const WorkingImages& images, double& share) {
-    constexpr std::size_t kFrames = 6;
+StillEdges still_edges(const WorkingImages& images) {
     constexpr float kCoherent = 0.97f, kStrong = 1.0f;  // of the mean
-    constexpr double kStandsStill = 0.2;                // beyond it the camera does
-    constexpr int kReach = 2;                           // [px], as far as gradients and blur reach
-    share = 0;
-    if (images.size() < kFrames) return images;
-
     const EdgeMap& first = images.reference_edges[0];
     const std::size_t size = first.z.size();
     std::vector<std::complex<float>> sum(size);
@@ -45,14 +44,30 @@ WorkingImages without_static_edges(const WorkingImages& images, double& share) {
             total += std::abs(edges.z[i]);
         }
     const float mean = static_cast<float>(total / static_cast<double>(size));
-    Mask mask{first.width, first.height, std::vector<std::uint8_t>(size)};
+    StillEdges out{{first.width, first.height, std::vector<std::uint8_t>(size)}, 0};
     double still = 0;
     for (std::size_t i = 0; i < size; ++i) {
-        mask.set[i] = length[i] > kStrong * mean && std::abs(sum[i]) > kCoherent * length[i];
-        if (mask.set[i]) still += length[i];
+        out.mask.set[i] = length[i] > kStrong * mean && std::abs(sum[i]) > kCoherent * length[i];
+        if (out.mask.set[i]) still += length[i];
     }
-    if (still == 0 || still > kStandsStill * total) return images;
-    share = still / total;
+    out.share = total > 0 ? still / total : 0;
+    return out;
+}
+
+}  // namespace
+
+bool camera_stands_still(const WorkingImages& images) {
+    return still_edges(images).share > kStandsStill;
+}
+
+WorkingImages without_static_edges(const WorkingImages& images, double& share) {
+    constexpr std::size_t kFrames = 6;
+    constexpr int kReach = 2;  // [px], as far as gradients and blur reach
+    share = 0;
+    if (images.size() < kFrames) return images;
+    const auto [mask, still] = still_edges(images);
+    if (still == 0 || still > kStandsStill) return images;
+    share = still;
 
     WorkingImages out = images;
     for (EdgeMap& edges : out.reference_edges)

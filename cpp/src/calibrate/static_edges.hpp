@@ -11,4 +11,7 @@ namespace xcalib {
 // 6 frames, or where so much stands still that the camera does.
 WorkingImages without_static_edges(const WorkingImages& images, double& share);
 
+// Do so many edges stay where they are that it is the camera that does not move?
+bool camera_stands_still(const WorkingImages& images);
+
 }  // namespace xcalib

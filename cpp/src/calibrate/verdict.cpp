@@ -30,7 +30,7 @@ struct Baseline {
 
 Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
     constexpr int kDirections = 8;
-    const double width = rig.reference.field().width();  // about an angle
+    const double width = rig.reference.width_by_focal();  // about an angle
     std::vector<double> values;
     for (double radius : {0.04, 0.07, 0.10})
         for (int i = 0; i < kDirections; ++i) {
@@ -119,11 +119,11 @@ std::optional<Objection> objection(const CalibrationReport& report, const Workin
 
 }  // namespace
 
-void judge(const WorkingImages& images, const Rig& rig, const Halves& halves, const Plan& plan,
-           CalibrationReport& report) {
+void judge(const WorkingImages& images, const Level& finest, const Rig& rig, const Halves& halves,
+           const Plan& plan, CalibrationReport& report) {
     const int num_threads = plan.options.num_threads;
     // Where halves were found apart, contrast only helps to say why they disagree.
-    constexpr std::size_t kFrames = 8;
+    constexpr std::size_t kFrames = 4;
     const Level level =
         make_level(halves.independent ? images.spread(kFrames) : images, kFactor, rig, num_threads);
     const double here = pooled(level, rig, num_threads).nec;
@@ -148,7 +148,7 @@ void judge(const WorkingImages& images, const Rig& rig, const Halves& halves, co
     verdict.date = today();
     verdict.software = "xcalib " XCALIB_VERSION;
     verdict.found = agree(halves, images) && (halves.independent || report.contrast >= 5.0);
-    report.errors = std::make_shared<const ErrorModel>(images, rig, halves, plan);
+    report.errors = std::make_shared<const ErrorModel>(images, finest, rig, halves, plan);
     const ErrorModel& model = *report.errors;
     report.weak_directions = model.weak_directions();
     verdict.expected_error = model.over_footage();

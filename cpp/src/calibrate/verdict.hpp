@@ -7,9 +7,9 @@
 
 namespace xcalib {
 
-// Fills verdict, converged, message, baseline_nec, contrast, repeatability_px and visible_shift_px
-// of the report.
-void judge(const WorkingImages& images, const Rig& rig, const Halves& halves, const Plan& plan,
-           CalibrationReport& report);
+// `finest`: the level that `rig` was solved at last. Fills verdict, converged, message,
+// baseline_nec, contrast, repeatability_px and visible_shift_px of the report.
+void judge(const WorkingImages& images, const Level& finest, const Rig& rig, const Halves& halves,
+           const Plan& plan, CalibrationReport& report);
 
 }  // namespace xcalib

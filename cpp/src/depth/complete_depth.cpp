@@ -97,7 +97,7 @@ cv::Mat diffused(const cv::Mat& value, const cv::Mat& mass, const cv::Mat& guide
 Image compressed_guide(const ImageView& guide, int width, int height) {
     Image out(width, height);
     cv::Mat small = as_mat(out);
-    const Image gray = to_gray(guide);
+    const Image gray = known_gray(guide);
     cv::resize(as_mat(gray), small, small.size(), 0, 0, cv::INTER_AREA);
     for (float& value : out.pixels)
         value = std::log1p(20 * std::clamp(value, 0.0f, 1.0f)) / std::log(21.0f);

@@ -44,6 +44,8 @@ PlaneDepth fit_plane(const std::vector<ImageView>& references,
     quick.optimize_reference = options.optimize_reference;
     quick.reference_camera = options.reference_camera;
     quick.source_camera = options.source_camera;
+    quick.reference_lens = options.reference_lens;
+    quick.source_lens = options.source_lens;
     quick.search.mode = SearchMode::off;
     quick.flow = FlowMode::off;  // the plane before is near enough
 

@@ -5,10 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <initializer_list>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
-#include <tuple>
 
 #include "base/format.hpp"
 #include "base/median.hpp"
@@ -19,13 +19,15 @@
 namespace xcalib {
 namespace {
 
-constexpr int kCandidates = 4;          // looked at for each frame wanted, at most
-constexpr int kWidth = 96;              // of the edge fields [px]
-constexpr int kScales = 17;             // trial widths of the source's view on the reference,
-constexpr double kSmallestScale = 0.4;  // equal fields of view at 1,
-constexpr double kLargestScale = 2.5;   // geometric between these
-constexpr int kPooled = 16;             // frames that vote on the one alignment, at most
-constexpr double kPrior = 0.1;          // known beforehand, as a share of what one frame adds
+constexpr int kCandidates = 4;           // looked at for each frame wanted, at most
+constexpr int kWidth = 96;               // of the edge fields [px]
+constexpr int kScales = 17;              // trial widths of the source's view on the reference,
+constexpr double kSmallestScale = 0.4;   // equal fields of view at 1,
+constexpr double kLargestScale = 2.5;    // geometric between these
+constexpr int kPooled = 16;              // frames that vote on the one alignment, at most
+constexpr int kFew = 8, kFewScales = 7;  // frames and scales that tell the mount
+constexpr double kClear = 1.2;  // score of a mount above the next one's, from which it is the one
+constexpr double kPrior = 0.1;  // known beforehand, as a share of what one frame adds
 // Edges below this share of the median frame's: a closed shutter, or no light at all.
 constexpr double kFlat = 0.15;
 // Edges below this, in the image's units, are rounding: a constant image.
@@ -47,18 +49,6 @@ cv::Mat as_mat(const EdgeMap& field) {
 }
 
 // -- One frame ------------------------------------------------------------------------------------
-
-template <class T>
-bool any_not_finite(const ImageView& image) {
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width * image.channels; ++x)
-            if (!std::isfinite(image.row<T>(y)[x])) return true;
-    return false;
-}
-
-bool not_finite(const ImageView& image) {
-    return image.type == PixelType::f32 && any_not_finite<float>(image);
-}
 
 template <class T>
 double share_at_end(const ImageView& image, bool both) {
@@ -166,16 +156,17 @@ void leave_bad_images(std::vector<Candidate>& candidates) {
         // The same pixels twice beside a visible image that changed: the thermal stream hung. The
         // first may have been in time.
         if (&first != &c && likeness(c, first, 0) < kDuplicate)
-            c.reason = "source is frozen since frame " + std::to_string(first.index);
+            c.reason = "source is frozen since frame " + std::to_string(first.index) +
+                       " (a shutter calibration, or a stream that hung)";
     }
 }
 
 // -- Where the two images' edges meet -------------------------------------------------------------
 
-cv::Mat scaled(const EdgeMap& field, double scale) {
+cv::Mat scaled(const cv::Mat& field, double scale) {
     cv::Mat out;
-    cv::resize(as_mat(field), out, {rounded(scale * field.width), rounded(scale * field.height)}, 0,
-               0, cv::INTER_AREA);
+    cv::resize(field, out, {rounded(scale * field.cols), rounded(scale * field.rows)}, 0, 0,
+               cv::INTER_AREA);
     return out;
 }
 
@@ -229,45 +220,111 @@ cv::Mat pooled_score(const std::vector<cv::Mat>& references, const std::vector<c
     return correlation(references, sources, size) / (norm + floor);
 }
 
-// Source edge fields on the reference grid, under the one scale and shift that fits all: edge
-// fields correlated at every shift by Fourier products, over a range of scales, pooled over the
-// frames and divided by the norms in the overlap. Displacements by depth remain: the fields are
+// How a source is mounted, roughly: quarter turns clockwise of its image, then its mirror.
+struct Turn {
+    int quarters = 0;
+    bool mirrored = false;
+};
+
+// The edge field of the image turned and mirrored back: with a quarter turn doubled angles turn by
+// a half, with a mirror they change their sign.
+cv::Mat turned_back(const cv::Mat& field, const Turn& turn) {
+    cv::Mat out = field.clone();
+    if (turn.mirrored) {
+        cv::flip(out, out, 1);
+        out.forEach<cv::Vec2f>([](cv::Vec2f& z, const int*) { z[1] = -z[1]; });
+    }
+    constexpr int kBack[] = {0, cv::ROTATE_90_COUNTERCLOCKWISE, cv::ROTATE_180,
+                             cv::ROTATE_90_CLOCKWISE};
+    if (turn.quarters) cv::rotate(out, out, kBack[turn.quarters]);
+    if (turn.quarters % 2) out = -out;
+    return out;
+}
+
+// Where the sources lie on the references, by one scale and shift for all.
+struct Alignment {
+    Turn turn;
+    double score = -INFINITY;  // normalized correlation, pooled
+    double scale = 1.0;
+    int x = 0, y = 0;  // [px of the fields]
+};
+
+// At most `count` of the candidates, spread over them.
+std::vector<const Candidate*> some_of(const std::vector<Candidate*>& candidates,
+                                      std::size_t count) {
+    const std::size_t step = (candidates.size() + count - 1) / count;
+    std::vector<const Candidate*> out;
+    for (std::size_t i = 0; i < candidates.size(); i += step) out.push_back(candidates[i]);
+    return out;
+}
+
+// Edge fields correlated at every shift by Fourier products, over a range of scales, pooled over
+// the frames and divided by the norms in the overlap. Displacements by depth remain: the fields are
 // coarse enough to bear them.
-std::vector<cv::Mat> aligned(const std::vector<Candidate*>& candidates) {
-    const std::size_t step = (candidates.size() + kPooled - 1) / kPooled;
-    std::vector<cv::Mat> references;
-    for (std::size_t i = 0; i < candidates.size(); i += step)
-        references.push_back(as_mat(candidates[i]->fields[0]));
+Alignment align(const std::vector<const Candidate*>& candidates, const Turn& turn, int scales) {
+    std::vector<cv::Mat> references, fields;
+    for (const Candidate* c : candidates) {
+        references.push_back(as_mat(c->fields[0]));
+        fields.push_back(turned_back(as_mat(c->fields[1]), turn));
+    }
     const cv::Size grid = references[0].size();
-    std::tuple<float, double, int, int> best{-INFINITY, 1.0, 0, 0};
-    for (int k = 0; k < kScales; ++k) {
-        const double scale =
-            kSmallestScale * std::pow(kLargestScale / kSmallestScale, k / (kScales - 1.0));
+    Alignment best;
+    best.turn = turn;
+    const double equal_width = static_cast<double>(grid.width) / fields[0].cols;
+    for (int k = 0; k < scales; ++k) {
+        const double scale = equal_width * kSmallestScale *
+                             std::pow(kLargestScale / kSmallestScale, k / (scales - 1.0));
         std::vector<cv::Mat> sources;
-        for (std::size_t i = 0; i < candidates.size(); i += step)
-            sources.push_back(scaled(candidates[i]->fields[1], scale));
+        for (const cv::Mat& field : fields) sources.push_back(scaled(field, scale));
         const cv::Mat score = pooled_score(references, sources);
         double value = 0;
         cv::Point at;
         cv::minMaxLoc(score, nullptr, &value, nullptr, &at);
+        if (value <= best.score) continue;
+        best.score = value;
+        best.scale = scale;
         // A shift beyond the reference is one to the left, or up, in a circular correlation.
-        if (at.x >= grid.width) at.x -= score.cols;
-        if (at.y >= grid.height) at.y -= score.rows;
-        best = std::max(best, {static_cast<float>(value), scale, at.x, at.y});
+        best.x = at.x >= grid.width ? at.x - score.cols : at.x;
+        best.y = at.y >= grid.height ? at.y - score.rows : at.y;
     }
-    const auto [value, scale, x, y] = best;
-    const cv::Matx23f shift(1, 0, static_cast<float>(x), 0, 1, static_cast<float>(y));
+    return best;
+}
+
+// The alignment that suits the footage, and whether it stands out of what other mounts give by
+// chance: where it does not, the mount is none of these.
+std::pair<Alignment, bool> align(const std::vector<Candidate*>& candidates) {
+    const std::vector<const Candidate*> few = some_of(candidates, kFew);
+    std::vector<Alignment> turns;
+    const auto clear = [&] {
+        std::sort(turns.begin(), turns.end(),
+                  [](const Alignment& a, const Alignment& b) { return a.score > b.score; });
+        return turns[0].score > kClear * turns[1].score;
+    };
+    const auto look = [&](std::initializer_list<Turn> at) {
+        for (const Turn& turn : at) turns.push_back(align(few, turn, kFewScales));
+    };
+    // Upright is the rule, and two others show what chance gives.
+    look({{0, false}, {2, false}, {1, true}});
+    if (!clear() || turns[0].turn.quarters || turns[0].turn.mirrored)
+        look({{0, true}, {1, false}, {2, true}, {3, false}, {3, true}});
+    const bool found = clear();
+    return {align(some_of(candidates, kPooled), found ? turns[0].turn : Turn{}, kScales), found};
+}
+
+// Source edge fields on the reference grid.
+std::vector<cv::Mat> aligned(const std::vector<Candidate*>& candidates, const Alignment& by) {
+    const cv::Matx23f shift(1, 0, static_cast<float>(by.x), 0, 1, static_cast<float>(by.y));
     std::vector<cv::Mat> out;
     for (const Candidate* c : candidates) {
         out.emplace_back();
-        cv::warpAffine(scaled(c->fields[1], scale), out.back(), shift, grid);
+        cv::warpAffine(scaled(turned_back(as_mat(c->fields[1]), by.turn), by.scale), out.back(),
+                       shift, as_mat(c->fields[0]).size());
     }
     return out;
 }
 
-void leave_disagreeing(const std::vector<Candidate*>& candidates,
+void measure_agreement(const std::vector<Candidate*>& candidates,
                        const std::vector<cv::Mat>& sources) {
-    std::vector<double> agreements;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
         const EdgeMap& reference = candidates[i]->fields[0];
         double overlapping = 0;
@@ -277,8 +334,12 @@ void leave_disagreeing(const std::vector<Candidate*>& candidates,
                     overlapping += std::norm(std::complex<double>(reference.row(y)[x]));
         const double norm = std::sqrt(overlapping) * cv::norm(sources[i]);
         candidates[i]->agreement = as_mat(reference).dot(sources[i]) / std::max(norm, 1e-12);
-        agreements.push_back(candidates[i]->agreement);
     }
+}
+
+void leave_disagreeing(const std::vector<Candidate*>& candidates) {
+    std::vector<double> agreements;
+    for (const Candidate* c : candidates) agreements.push_back(c->agreement);
     const double usual = median(std::move(agreements));
     for (Candidate* c : candidates)
         if (c->agreement < kDisagrees * usual)
@@ -390,16 +451,19 @@ Candidate look_at(int index, const ImageView& reference, const ImageView& source
                   const ImageView* depth) {
     Candidate found;
     found.index = index;
-    for (const auto& [name, image] : {std::pair{"reference", &reference}, {"source", &source}})
-        if (not_finite(*image)) {
-            found.reason = std::string(name) + " has pixels that are not finite";
+    Image dark, bright;
+    for (const auto& [name, image, gray] :
+         {std::tuple{"reference", &reference, &dark}, {"source", &source, &bright}})
+        try {
+            *gray = known_gray(*image);
+        } catch (const std::invalid_argument& error) {
+            found.reason = std::string(name) + ": " + error.what();
             return found;
         }
-    Image dark = to_gray(reference);
     // As the objective does, for the edges of a night image lie in its darkest tenth.
     if (reference.type != PixelType::f32)
         for (float& value : dark.pixels) value = std::log1p(20 * value);
-    const Gradient gradients[2] = {gradient(dark), gradient(to_gray(source))};
+    const Gradient gradients[2] = {gradient(dark), gradient(bright)};
     for (const int camera : {0, 1}) {
         found.edges[camera] = contrast(gradients[camera]);
         found.fields[camera] = edge_field(gradients[camera]);
@@ -441,8 +505,10 @@ Choice choose(std::vector<Candidate> candidates, int max_frames) {
     for (Candidate& c : candidates)
         if (usable(c)) sound.push_back(&c);
     if (!sound.empty()) {
-        const std::vector<cv::Mat> sources = aligned(sound);
-        leave_disagreeing(sound, sources);
+        const auto [alignment, clear] = align(sound);
+        const std::vector<cv::Mat> sources = aligned(sound, alignment);
+        measure_agreement(sound, sources);
+        if (clear) leave_disagreeing(sound);
         std::vector<Candidate*> agreeing;
         std::vector<const cv::Mat*> theirs;
         for (std::size_t i = 0; i < sound.size(); ++i)

@@ -29,6 +29,8 @@ std::string fingerprint(const Rig& rig) {
         for (const double value : {double(camera.width), double(camera.height), camera.fx,
                                    camera.fy, camera.cx, camera.cy, camera.skew})
             add(value);
+    for (const Pinhole& camera : {rig.reference, rig.source})
+        if (camera.lens.model() != LensModel::none) numbers += Lens::word(camera.lens) + " ";
     const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
     for (const double value : {q.w(), q.x(), q.y(), q.z()}) add(value);
     for (const double value : rig.t()) add(value);

@@ -193,16 +193,24 @@ std::optional<std::vector<double>> times_of_names(const std::vector<std::string>
     return times;
 }
 
+constexpr std::size_t kMaxLine = 4096;
+
 std::vector<double> times_of_table(const std::string& text, const std::string& table,
                                    const std::vector<std::string>& names) {
     static const std::regex separator(R"(\s*[,;]\s*|\s+)");
     std::map<std::string, double> found;
+    std::set<std::string> given;
     std::istringstream lines(text);
     int number = 0;
     for (std::string line; std::getline(lines, line);) {
         ++number;
         line = stripped(line);
         if (line.empty() || line[0] == '#') continue;
+        // Of which an expression would take the stack.
+        if (line.size() > kMaxLine)
+            throw InputError(table + " line " + std::to_string(number) + ": " +
+                             std::to_string(line.size()) +
+                             " characters, expected `name timestamp`");
         std::vector<std::string> cells(
             std::sregex_token_iterator(line.begin(), line.end(), separator, -1), {});
         for (std::string& cell : cells) cell = stripped(cell, " \"'");
@@ -213,6 +221,9 @@ std::vector<double> times_of_table(const std::string& text, const std::string& t
             throw InputError(table + " line " + std::to_string(number) + ": '" + line +
                              "', expected `name timestamp`");
         }
+        if (!given.insert(cells[0]).second)
+            throw InputError(table + " line " + std::to_string(number) + ": '" + cells[0] +
+                             "' again, expected a line for each frame");
         found[cells[0]] = found[path(cells[0]).stem().string()] = *time;
     }
     std::vector<double> times;
@@ -247,6 +258,7 @@ std::string Pairing::line() const {
             " (median gap %.1f ms, source late by %+.4f s); without a partner: %d reference,"
             " %d source frames",
             1e3 * gap, offset, dropped_references, dropped_sources);
+    if (lag != 0) text += format("; source late by %+d of its frames", lag);
     return text;
 }
 
@@ -271,6 +283,7 @@ Pairing pair_times(const std::vector<double>& references, const std::vector<doub
     std::vector<double> gaps;
     auto first = many.begin();
     for (std::size_t i = 0; i < few.size(); ++i) {
+        if (i > 0 && few[i] == few[i - 1]) continue;  // two frames of one moment: one is wrong
         const auto distance = [&](auto at) { return std::abs(*at - few[i]); };
         auto best = std::lower_bound(first, many.end(), few[i]);
         if (best != first && (best == many.end() || distance(best - 1) <= distance(best))) --best;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -22,14 +23,28 @@ void require(bool ok, const char* camera, const char* field, double value, const
     throw std::invalid_argument(message.str());
 }
 
+// The point that the lens shows there, or, where it shows none, one as far out as there is any.
+Eigen::Vector2d seen_through(const Lens& lens, const Eigen::Vector2d& shown) {
+    constexpr double kFar = 1e3;
+    if (const auto point = lens.undistort(shown)) return *point;
+    return shown.normalized() * std::min(kFar, lens.max_radius());
+}
+
+double angle_of(const Lens& lens, const Eigen::Vector2d& shown) {
+    return std::atan(seen_through(lens, shown).norm());
+}
+
 }  // namespace
 
-Pinhole Pinhole::from_hfov(int width, int height, double hfov) {
+Pinhole Pinhole::from_hfov(int width, int height, double hfov, const Lens& lens) {
     require(hfov > 0 && hfov < kPi, "camera", "hfov", hfov, "an angle in (0, pi) rad");
     Pinhole camera;
     camera.width = width;
     camera.height = height;
-    camera.fx = camera.fy = width / (2 * std::tan(hfov / 2));
+    const auto border = lens.distort({std::tan(hfov / 2), 0});
+    require(border.has_value(), "camera", "hfov", hfov, "an angle in rad that its lens shows");
+    camera.fx = camera.fy = width / (2 * border->norm());
+    camera.lens = lens;
     camera.cx = (width - 1) / 2.0;
     camera.cy = (height - 1) / 2.0;
     return camera;
@@ -37,7 +52,7 @@ Pinhole Pinhole::from_hfov(int width, int height, double hfov) {
 
 Pinhole Pinhole::from_K(int width, int height, const Eigen::Matrix3d& K) {
     const Eigen::Matrix3d k = K / K(2, 2);
-    return {width, height, k(0, 0), k(1, 1), k(0, 2), k(1, 2), k(0, 1)};
+    return {width, height, k(0, 0), k(1, 1), k(0, 2), k(1, 2), k(0, 1), {}};
 }
 
 Eigen::Matrix3d Pinhole::K() const {
@@ -46,11 +61,38 @@ Eigen::Matrix3d Pinhole::K() const {
     return k;
 }
 
-double Pinhole::hfov() const { return 2 * std::atan(width / (2 * fx)); }
-double Pinhole::vfov() const { return 2 * std::atan(height / (2 * fy)); }
+double Pinhole::hfov() const {
+    const double half = width / (2 * fx);
+    if (!lens.bends()) return 2 * std::atan(half);
+    return angle_of(lens, {-half, 0}) + angle_of(lens, {half, 0});
+}
+double Pinhole::vfov() const {
+    const double half = height / (2 * fy);
+    if (!lens.bends()) return 2 * std::atan(half);
+    return angle_of(lens, {0, -half}) + angle_of(lens, {0, half});
+}
 
 Pinhole::Field Pinhole::field() const {
-    return {-(cx + 0.5) / fx, (width - 0.5 - cx) / fx, -(cy + 0.5) / fy, (height - 0.5 - cy) / fy};
+    Field field{-(cx + 0.5) / fx, (width - 0.5 - cx) / fx, -(cy + 0.5) / fy,
+                (height - 0.5 - cy) / fy};
+    if (!lens.bends()) return field;
+    constexpr int kSteps = 64;
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    Field seen{kNone, -kNone, kNone, -kNone};
+    const auto take = [&](double x, double y) {
+        const Eigen::Vector2d point = seen_through(lens, {x, y});
+        seen.left = std::min(seen.left, point.x());
+        seen.right = std::max(seen.right, point.x());
+        seen.top = std::min(seen.top, point.y());
+        seen.bottom = std::max(seen.bottom, point.y());
+    };
+    for (int i = 0; i <= kSteps; ++i) {
+        const double x = field.left + i * field.width() / kSteps;
+        const double y = field.top + i * (field.bottom - field.top) / kSteps;
+        for (const double border : {field.top, field.bottom}) take(x, border);
+        for (const double border : {field.left, field.right}) take(border, y);
+    }
+    return seen;
 }
 
 Pinhole Pinhole::zoomed(double factor) const {
@@ -64,6 +106,7 @@ Pinhole Pinhole::flipped() const {
     Pinhole out = *this;
     out.cx = width - 1 - cx;
     out.skew = -skew;
+    out.lens = lens.flipped();
     return out;
 }
 
@@ -80,6 +123,7 @@ Pinhole Pinhole::resized(int new_width, int new_height) const {
     camera.cx = (cx + 0.5) * sx - 0.5;
     camera.cy = (cy + 0.5) * sy - 0.5;
     camera.skew = skew * sx;
+    camera.lens = lens;
     return camera;
 }
 
@@ -91,6 +135,7 @@ void Pinhole::validate(const char* name) const {
     require(std::isfinite(cx), name, "cx", cx, "a finite number of px");
     require(std::isfinite(cy), name, "cy", cy, "a finite number of px");
     require(std::isfinite(skew), name, "skew", skew, "a finite number of px");
+    lens.validate(name);
 }
 
 Rig Rig::resized(int reference_width, int reference_height, int source_width,
@@ -151,13 +196,17 @@ Rig fitted(const Rig& rig, int reference_width, int reference_height, int source
 Eigen::Vector3d unproject(const Pinhole& camera, double u, double v, double z) {
     const double y = (v - camera.cy) / camera.fy;
     const double x = (u - camera.cx - camera.skew * y) / camera.fx;
-    return {x * z, y * z, z};
+    if (!camera.lens.bends()) return {x * z, y * z, z};
+    const auto point = camera.lens.undistort({x, y});
+    if (!point) return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+    return z * point->homogeneous();
 }
 
 Eigen::Vector2d project(const Pinhole& camera, const Eigen::Vector3d& x_in_camera) {
-    const double x = x_in_camera.x() / x_in_camera.z();
-    const double y = x_in_camera.y() / x_in_camera.z();
-    return {camera.fx * x + camera.skew * y + camera.cx, camera.fy * y + camera.cy};
+    const auto shown = camera.lens.distort(x_in_camera.hnormalized());
+    if (!shown) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+    return {camera.fx * shown->x() + camera.skew * shown->y() + camera.cx,
+            camera.fy * shown->y() + camera.cy};
 }
 
 Rig turn_source(const Rig& rig, const Eigen::Vector3d& rotation) {

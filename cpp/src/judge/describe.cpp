@@ -19,9 +19,9 @@ std::string vector_text(const Eigen::Vector3d& v) {
 std::string camera_text(const char* name, const Pinhole& c) {
     return format(
         "%-10s %dx%d px, fx %.2f fy %.2f px, HFoV %.2f VFoV %.2f deg, cx %.2f cy %.2f px,"
-        " skew %.3f px\n",
+        " skew %.3f px%s\n",
         name, c.width, c.height, c.fx, c.fy, c.hfov() * kDegrees, c.vfov() * kDegrees, c.cx, c.cy,
-        c.skew);
+        c.skew, c.lens.bends() ? (", lens " + Lens::word(c.lens)).c_str() : "");
 }
 
 std::string error_text(const ExpectedError& error) {

@@ -33,6 +33,13 @@ Json json_of(const LevelReport& l) {
             {"stopped", l.stopped}};
 }
 
+Json json_of(const LensReport& l) {
+    return {{"tried", l.tried},
+            {"coefficients", l.coefficients},
+            {"gain", l.gain},
+            {"gain_deviation", l.gain_deviation}};
+}
+
 Json json_of(const AdamStep& s) {
     return {{"learning_rate", s.learning_rate},
             {"image", s.image},
@@ -47,15 +54,19 @@ Json json_of(const CalibrationTimes& t) {
 }
 
 Json json_of(const Pinhole& camera) {
-    return {{"width", camera.width},
-            {"height", camera.height},
-            {"fx", camera.fx},
-            {"fy", camera.fy},
-            {"cx", camera.cx},
-            {"cy", camera.cy},
-            {"skew", camera.skew},
-            {"hfov_deg", camera.hfov() / kDegree},
-            {"vfov_deg", camera.vfov() / kDegree}};
+    Json out{{"width", camera.width},
+             {"height", camera.height},
+             {"fx", camera.fx},
+             {"fy", camera.fy},
+             {"cx", camera.cx},
+             {"cy", camera.cy},
+             {"skew", camera.skew},
+             {"hfov_deg", camera.hfov() / kDegree},
+             {"vfov_deg", camera.vfov() / kDegree}};
+    if (camera.lens.model() != LensModel::none)
+        out["lens"] = {{"model", name_of(camera.lens.model())},
+                       {"coefficients", camera.lens.coefficients()}};
+    return out;
 }
 
 Json json_of(const ExpectedError& error) { return {{"median", error.median}, {"p95", error.p95}}; }
@@ -76,6 +87,25 @@ Json numbers_of(const Vector& values) {
     Json list = Json::array();
     for (const double value : values) list.push_back(value);
     return list;
+}
+
+Json json_of(const LagReport& lag) {
+    if (lag.fits.empty()) return nullptr;
+    Json fits = Json::array();
+    for (const LagFit& fit : lag.fits) {
+        const RigFacts facts = describe(fit.rig);
+        fits.push_back({{"lag", fit.lag},
+                        {"frames", fit.frames},
+                        {"factor", fit.factor},
+                        {"nec", fit.nec},
+                        {"gain", fit.gain},
+                        {"error", fit.error},
+                        {"translation_m", numbers_of(fit.rig.t())},
+                        {"pan_deg", facts.pan_deg},
+                        {"tilt_deg", facts.tilt_deg},
+                        {"skew_px", fit.rig.source.skew}});
+    }
+    return {{"frames", lag.frames}, {"change", lag.change}, {"fits", fits}};
 }
 
 std::string text_of(const Json& document) {
@@ -117,7 +147,9 @@ Json json_of(const CalibrationReport& report) {
             {"frames", report.frames},
             {"candidates", list_of(report.candidates)},
             {"levels", list_of(report.levels)},
-            {"steps", list_of(report.steps)}};
+            {"lens", json_of(report.lens)},
+            {"steps", list_of(report.steps)},
+            {"lag", json_of(report.lag)}};
 }
 
 Json json_of(const Scores& scores) {

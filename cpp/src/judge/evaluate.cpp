@@ -137,7 +137,7 @@ Evaluator::~Evaluator() = default;
 void Evaluator::add(const ImageView& reference, const ImageView& source, const ImageView& depth) {
     State& s = *state_;
     if (!s.registrar) s.open(reference, source);
-    const Image target = resized(to_gray(reference), s.size), plain = to_gray(source);
+    const Image target = resized(known_gray(reference), s.size), plain = known_gray(source);
     Image registered(s.size.width, s.size.height);
     std::vector<std::uint8_t> codes(registered.pixels.size());
     const ImageView grid = registered.view();

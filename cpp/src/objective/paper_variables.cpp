@@ -18,6 +18,7 @@ PaperVector vector_of(const PaperParameters& p) {
     put(kPaperSource, p.source);
     x.segment<4>(kPaperQuaternion) = p.quaternion;
     x.segment<9>(kPaperTranslation) = p.translation.reshaped();
+    x.segment<2>(kPaperLens) << p.source_lens[0], p.source_lens[1];
     return x;
 }
 
@@ -31,6 +32,7 @@ PaperParameters paper_of(const PaperVector& x) {
     p.source = camera(kPaperSource);
     p.quaternion = x.segment<4>(kPaperQuaternion);
     p.translation = x.segment<9>(kPaperTranslation).reshaped(3, 3);
+    for (int i = 0; i < 2; ++i) p.source_lens[i] = x[kPaperLens + i];
     return p;
 }
 
@@ -64,6 +66,7 @@ Eigen::Matrix<double, kNumParameters, kNumPaperVariables> paper_jacobian(const P
     for (int scale = 0; scale < 3; ++scale)
         jacobian.block<3, 3>(kTranslationX, kPaperTranslation + 3 * scale) =
             std::pow(kPaperTranslationScale, scale) * Eigen::Matrix3d::Identity();
+    jacobian.block<2, 2>(kSourceK1, kPaperLens).setIdentity();
     return jacobian;
 }
 

@@ -8,13 +8,14 @@
 namespace xcalib {
 
 // The paper's unconstrained variables in one row: reference and source camera (fx, fy, cx, cy,
-// skew), quaternion (w x y z), translation (x y z, by scales).
+// skew), quaternion (w x y z), translation (x y z, by scales), and k1, k2 of the source.
 enum PaperVariable : int {
     kPaperReference,
     kPaperSource = kPaperReference + 5,
     kPaperQuaternion = kPaperSource + 5,
     kPaperTranslation = kPaperQuaternion + 4,
-    kNumPaperVariables = kPaperTranslation + 9
+    kPaperLens = kPaperTranslation + 9,
+    kNumPaperVariables = kPaperLens + 2
 };
 using PaperVector = Eigen::Matrix<double, kNumPaperVariables, 1>;
 

@@ -68,7 +68,7 @@ HWY_INLINE Sampled interpolated(const Cell& cell, Float t0, Float t1, Float b0, 
             hn::MulAdd(cell.b, hn::Sub(bottom_step, top_step), top_step), down};
 }
 
-template <int kParameter>
+template <int kParameter, bool kBends>
 void partial_row(const ProjectionDerivative& derivative, const PointRow& row,
                  const float* HWY_RESTRICT depth, const float* HWY_RESTRICT du,
                  const float* HWY_RESTRICT dv, int width, float* HWY_RESTRICT out) {
@@ -84,36 +84,63 @@ void partial_row(const ProjectionDerivative& derivative, const PointRow& row,
     const float* HWY_RESTRICT qx = row.qx.data();
     const float* HWY_RESTRICT qy = row.qy.data();
     const float* HWY_RESTRICT qz = row.qz.data();
-    for (int x = 0; x < width; ++x)
-        out[x] =
-            d.partial<kParameter>({ray_x[x], ray_y[x], rx[x], ry[x], rz[x], px[x], py[x], pz[x]},
-                                  depth[x], {du[x], dv[x], qx[x], qy[x], qz[x]});
+    const float* HWY_RESTRICT shown_x = kBends ? row.shown_x.data() : px;
+    const float* HWY_RESTRICT shown_y = kBends ? row.shown_y.data() : py;
+    const float* HWY_RESTRICT xx = row.reference.xx.data();
+    const float* HWY_RESTRICT xy = row.reference.xy.data();
+    const float* HWY_RESTRICT yy = row.reference.yy.data();
+    for (int x = 0; x < width; ++x) {
+        SeenPoint p{ray_x[x], ray_y[x], rx[x], ry[x],      rz[x],
+                    px[x],    py[x],    pz[x], shown_x[x], shown_y[x]};
+        if constexpr (kBends) p.reference = {xx[x], xy[x], yy[x]};
+        out[x] = d.partial<kParameter, kBends>(p, depth[x], {du[x], dv[x], qx[x], qy[x], qz[x]});
+    }
 }
 
-// df by the parameters, parameter-major, for a row of df/du and df/dv.
-void derivative_row(const ProjectionDerivative& derivative, const Parameters& parameters,
-                    const float* HWY_RESTRICT depth, const float* HWY_RESTRICT du,
-                    const float* HWY_RESTRICT dv, int width, PointRow& row, float* HWY_RESTRICT out,
-                    int stride) {
+// df/dX_S of a row.
+template <bool kBends>
+void slope_row(const ProjectionDerivative& derivative, const float* HWY_RESTRICT du,
+               const float* HWY_RESTRICT dv, int width, PointRow& row) {
     const ProjectionDerivative d = derivative;
     const float* HWY_RESTRICT px = row.x.data();
     const float* HWY_RESTRICT py = row.y.data();
     const float* HWY_RESTRICT pz = row.inverse_z.data();
+    const float* HWY_RESTRICT xx = row.source.xx.data();
+    const float* HWY_RESTRICT xy = row.source.xy.data();
+    const float* HWY_RESTRICT yy = row.source.yy.data();
     float* HWY_RESTRICT qx = row.qx.data();
     float* HWY_RESTRICT qy = row.qy.data();
     float* HWY_RESTRICT qz = row.qz.data();
     for (int x = 0; x < width; ++x) {
-        const ProjectionDerivative::Slope s =
-            d.slope({0, 0, 0, 0, 0, px[x], py[x], pz[x]}, du[x], dv[x]);
+        SeenPoint p{0, 0, 0, 0, 0, px[x], py[x], pz[x], 0, 0};
+        if constexpr (kBends) p.source = {xx[x], xy[x], yy[x]};
+        const ProjectionDerivative::Slope s = d.slope<kBends>(p, du[x], dv[x]);
         qx[x] = s.qx;
         qy[x] = s.qy;
         qz[x] = s.qz;
     }
+}
+
+// df by the parameters, parameter-major, for a row of df/du and df/dv.
+template <bool kBends>
+void derivative_row_of(const ProjectionDerivative& derivative, const Parameters& parameters,
+                       const float* HWY_RESTRICT depth, const float* HWY_RESTRICT du,
+                       const float* HWY_RESTRICT dv, int width, PointRow& row,
+                       float* HWY_RESTRICT out, int stride) {
+    slope_row<kBends>(derivative, du, dv, width, row);
     for (int i = 0; i < parameters.size(); ++i)
         ProjectionDerivative::each<kNumParameters>([&](auto p) {
             if (parameters[i] == p)
-                partial_row<p>(derivative, row, depth, du, dv, width, out + i * stride);
+                partial_row<p, kBends>(derivative, row, depth, du, dv, width, out + i * stride);
         });
+}
+void derivative_row(const ProjectionDerivative& derivative, const Parameters& parameters,
+                    const float* HWY_RESTRICT depth, const float* HWY_RESTRICT du,
+                    const float* HWY_RESTRICT dv, int width, PointRow& row, float* HWY_RESTRICT out,
+                    int stride) {
+    if (row.bends())
+        derivative_row_of<true>(derivative, parameters, depth, du, dv, width, row, out, stride);
+    else derivative_row_of<false>(derivative, parameters, depth, du, dv, width, row, out, stride);
 }
 
 // sums += the products of the columns. Lower triangle, by blocks of two by four.

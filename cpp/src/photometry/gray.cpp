@@ -49,7 +49,9 @@ class Percentiles {
 
 }  // namespace
 
-Image to_gray(const ImageView& image) {
+namespace {
+
+Image as_gray(const ImageView& image) {
     if (image.channels != 1 && image.channels != 3)
         throw std::invalid_argument("image has " + std::to_string(image.channels) +
                                     " channels, expected 1 or 3");
@@ -57,18 +59,75 @@ Image to_gray(const ImageView& image) {
     switch (image.type) {
         case PixelType::u8: gray_rows<std::uint8_t>(image, 1.0f / 255, gray); break;
         case PixelType::u16: gray_rows<std::uint16_t>(image, 1.0f / 65535, gray); break;
-        case PixelType::f32:
-            gray_rows<float>(image, 1.0f, gray);
-            for (std::size_t i = 0; i < gray.pixels.size(); ++i)
-                if (!std::isfinite(gray.pixels[i])) {
-                    std::ostringstream message;
-                    message << "image has the value " << gray.pixels[i]
-                            << " at x = " << i % image.width << ", y = " << i / image.width
-                            << ", expected finite pixels";
-                    throw std::invalid_argument(message.str());
-                }
-            break;
+        case PixelType::f32: gray_rows<float>(image, 1.0f, gray); break;
     }
+    return gray;
+}
+
+// Layer by layer from what is known, each pixel the mean of its neighbours in the layers before.
+void fill_unknown(Image& image) {
+    const int width = image.width, height = image.height;
+    std::vector<std::uint8_t> state(image.pixels.size());  // 0 unknown, 1 known, 2 in the layer
+    const auto around = [&](int at, const auto& work) {
+        const int x = at % width, y = at / width;
+        for (int v = std::max(0, y - 1); v <= std::min(height - 1, y + 1); ++v)
+            for (int u = std::max(0, x - 1); u <= std::min(width - 1, x + 1); ++u)
+                work(v * width + u);
+    };
+    for (std::size_t i = 0; i < state.size(); ++i) state[i] = std::isfinite(image.pixels[i]);
+    std::vector<int> layer, next;
+    const auto reach = [&](int at) {
+        around(at, [&](int i) {
+            if (state[static_cast<std::size_t>(i)] != 0) return;
+            state[static_cast<std::size_t>(i)] = 2;
+            next.push_back(i);
+        });
+    };
+    for (int i = 0; i < width * height; ++i)
+        if (state[static_cast<std::size_t>(i)] == 1) reach(i);
+    while (!next.empty()) {
+        layer.swap(next);
+        next.clear();
+        for (const int at : layer) {
+            float sum = 0;
+            int count = 0;
+            around(at, [&](int i) {
+                if (state[static_cast<std::size_t>(i)] != 1) return;
+                sum += image.pixels[static_cast<std::size_t>(i)];
+                ++count;
+            });
+            image.pixels[static_cast<std::size_t>(at)] = sum / static_cast<float>(count);
+        }
+        for (const int at : layer) state[static_cast<std::size_t>(at)] = 1;
+        for (const int at : layer) reach(at);
+    }
+}
+
+}  // namespace
+
+Image to_gray(const ImageView& image) {
+    Image gray = as_gray(image);
+    if (image.type != PixelType::f32) return gray;
+    for (std::size_t i = 0; i < gray.pixels.size(); ++i)
+        if (!std::isfinite(gray.pixels[i])) {
+            std::ostringstream message;
+            message << "image has the value " << gray.pixels[i] << " at x = " << i % image.width
+                    << ", y = " << i / image.width << ", expected finite pixels";
+            throw std::invalid_argument(message.str());
+        }
+    return gray;
+}
+
+Image known_gray(const ImageView& image) {
+    Image gray = as_gray(image);
+    if (image.type != PixelType::f32) return gray;
+    const auto unknown = std::count_if(gray.pixels.begin(), gray.pixels.end(),
+                                       [](float value) { return !std::isfinite(value); });
+    if (2 * static_cast<std::size_t>(unknown) > gray.pixels.size())
+        throw std::invalid_argument("image has " + std::to_string(unknown) + " of " +
+                                    std::to_string(gray.pixels.size()) +
+                                    " pixels that are not finite, expected at most half of them");
+    if (unknown) fill_unknown(gray);
     return gray;
 }
 

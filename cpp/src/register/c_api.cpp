@@ -44,15 +44,28 @@ void require_given(const void* pointer, const char* argument) {
     if (!pointer) reject(argument, " is NULL");
 }
 
-Pinhole camera_of(const xcalib_camera& camera) {
-    return {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.skew};
+Lens lens_of(const xcalib_camera& camera, const char* name) {
+    const double* c = camera.lens_coefficients;
+    switch (camera.lens) {
+        case XCALIB_LENS_NONE: return {};
+        case XCALIB_LENS_BROWN: return {LensModel::brown, {c, c + 8}};
+        case XCALIB_LENS_FISHEYE: return {LensModel::fisheye, {c, c + 4}};
+        default:
+            reject(name,
+                   ": lens is " + std::to_string(camera.lens) + ", expected an xcalib_lens_model");
+    }
+}
+
+Pinhole camera_of(const xcalib_camera& camera, const char* name) {
+    return {camera.width, camera.height, camera.fx,   camera.fy,
+            camera.cx,    camera.cy,     camera.skew, lens_of(camera, name)};
 }
 
 Rig rig_of(const xcalib_rig& rig) {
     const double* q = rig.quaternion_wxyz;
     const double* t = rig.translation_m;
-    return {camera_of(rig.reference),
-            camera_of(rig.source),
+    return {camera_of(rig.reference, "reference"),
+            camera_of(rig.source, "source"),
             {Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d(t[0], t[1], t[2])},
             std::nullopt,
             rig.source_mirrored != 0};

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/projector.hpp"
+
 namespace xcalib {
 namespace {
 
@@ -14,10 +16,35 @@ constexpr double kMinShift = 0.5;
 constexpr double kMaxPerPixel = 2;
 constexpr double kMaxCells = 4e6;  // of which the kernel can count
 
+// How far apart reference pixels are in the source, of something far, along x and y. [px] Where
+// lenses bend, that varies over the image, and the farthest apart count: nothing is to be seen
+// between them.
+Eigen::Vector2d steps_of(const Rig& rig) {
+    Eigen::Vector2d steps = rig.source_density();
+    if (!rig.reference.lens.bends() && !rig.source.lens.bends()) return steps;
+    constexpr double kFar = 1e6;  // [m]
+    constexpr int kPlaces = 16;   // to a side
+    const auto visible = [&](const Eigen::Vector2d& at) {
+        return at.x() >= 0 && at.y() >= 0 && at.x() <= rig.source.width - 1 &&
+               at.y() <= rig.source.height - 1;
+    };
+    for (int i = 0; i <= kPlaces; ++i)
+        for (int k = 0; k <= kPlaces; ++k) {
+            const double x = (rig.reference.width - 2.0) * k / kPlaces;
+            const double y = (rig.reference.height - 2.0) * i / kPlaces;
+            const Eigen::Vector2d here = transfer(rig, x, y, kFar);
+            const Eigen::Vector2d right = transfer(rig, x + 1, y, kFar) - here;
+            const Eigen::Vector2d down = transfer(rig, x, y + 1, kFar) - here;
+            if (!visible(here) || !right.allFinite() || !down.allFinite()) continue;
+            steps = steps.cwiseMax(right.cwiseAbs().cwiseMax(down.cwiseAbs()));
+        }
+    return steps;
+}
+
 }  // namespace
 
 CellGrid::CellGrid(const Rig& rig) {
-    const Eigen::Vector2d density = rig.source_density();
+    const Eigen::Vector2d density = steps_of(rig);
     double x = std::min(kMaxPerPixel, 1 / density.x());
     double y = std::min(kMaxPerPixel, 1 / density.y());
     const double cells = (rig.source.width * x + 2) * (rig.source.height * y + 2);

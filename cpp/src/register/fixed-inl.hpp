@@ -38,13 +38,15 @@ HWY_INLINE bool fits_fixed(const Source& source, Reach reach) {
            source.height <= kMaxPixels;
 }
 
-// Whether all points lie in the window that begins at this offset. Those that do are written to
-// `out`, others are anything. x and y count from the window's first pixel. [1/256 px]
+// Whether all points lie in the window that begins at this offset, between two of its rows, or in
+// three rows, `kRows` being 1 or 2. Those that do are written to `out`, others are anything. x and
+// y count from the window's first pixel. [1/256 px]
+template <int kRows>
 HWY_INLINE bool interpolate_fixed(const Source& source, int offset, Int x, Int y,
                                   std::uint8_t* out) {
     const __mmask16 inside = _mm512_mask_cmplt_epu32_mask(
         _mm512_cmplt_epu32_mask(x.raw, _mm512_set1_epi32((kFixedWindow - 1) << 8)), y.raw,
-        _mm512_set1_epi32(1 << 8));
+        _mm512_set1_epi32(kRows << 8));
     const auto each_lane = [](int four) HWY_ATTR { return _mm512_set1_epi32(four); };
     // Bytes of a lane: left and right above, left and right below.
     const auto spread = [&](Int from_lanes, int byte) HWY_ATTR {
@@ -56,8 +58,17 @@ HWY_INLINE bool interpolate_fixed(const Source& source, int offset, Int x, Int y
     const __m512i place = _mm512_add_epi8(spread(x, 0x01010101), each_lane(0x01000100));
     const __m512i above = _mm512_loadu_si512(source.data + offset);
     const __m512i below = _mm512_loadu_si512(source.data + offset + source.row_bytes);
-    const __m512i four = _mm512_mask_permutexvar_epi8(_mm512_permutexvar_epi8(place, above),
-                                                      0xccccccccccccccccull, place, below);
+    constexpr __mmask64 kLower = 0xccccccccccccccccull;  // bytes of a lane
+    __m512i four = _mm512_permutexvar_epi8(place, above);
+    if constexpr (kRows == 1) {
+        four = _mm512_mask_permutexvar_epi8(four, kLower, place, below);
+    } else {  // lanes a row further down take both from there
+        const __m512i last = _mm512_loadu_si512(source.data + offset + 2 * source.row_bytes);
+        const __mmask64 down_a_row = _mm512_movepi8_mask(
+            _mm512_movm_epi32(_mm512_cmpge_epu32_mask(y.raw, _mm512_set1_epi32(1 << 8))));
+        four = _mm512_mask_permutexvar_epi8(four, kLower ^ down_a_row, place, below);
+        four = _mm512_mask_permutexvar_epi8(four, kLower & down_a_row, place, last);
+    }
     // 255 less a byte is the byte with all bits turned. The weights sum up to 255: a place that was
     // cut down to n / 256 is counted as n / 255, which is right in the mean, and where n is 0.
     const __m512i along = _mm512_xor_si512(spread(x, 0), each_lane(0x00ff00ff));

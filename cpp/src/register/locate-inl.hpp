@@ -70,6 +70,22 @@ HWY_INLINE Located locate(const Row& row, Float depth, Float x) {
     return out;
 }
 
+HWY_INLINE Located locate(const LensRow& row, Float depth, int column) {
+    const Points p = project<true>(row, depth, column);
+    Located out;
+    out.z = p.z;
+    out.inverse_z = p.inverse_z;
+    out.x = hn::Add(p.u, set(kLarge));
+    out.y = hn::Add(p.v, set(kLarge));
+    out.a = hn::Add(hn::Sub(p.u, out.left()), set(0.5));
+    out.b = hn::Add(hn::Sub(p.v, out.top()), set(0.5));
+    return out;
+}
+
+HWY_INLINE Located locate(const AnyRow& row, Float depth, Float x, int column) {
+    return row.bends ? locate(row.bent, depth, column) : locate(row.straight, depth, x);
+}
+
 // A row of the caller's depth.
 struct DepthRow {
     const char* data;

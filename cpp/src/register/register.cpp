@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <mutex>
 #include <sstream>
@@ -12,6 +13,7 @@
 #include "base/parallel.hpp"
 #include "base/workers.hpp"
 #include "register/register_rows.hpp"
+#include "xcalib/threads.hpp"
 
 namespace xcalib {
 namespace {
@@ -41,12 +43,39 @@ Image in_metres(const DepthView& depth) {
     return out;
 }
 
+// Where the source has no number, or is made of one that is none, it has no value: as outside of
+// it.
+void drop_not_finite(const MutableImageView& image, int begin, int end, std::uint8_t* mask) {
+    constexpr std::uint32_t kExponent = 0x7f800000;  // all of its bits: infinite, or not a number
+    const int values = image.width * image.channels;
+    const auto is_finite = [](float value) {
+        std::uint32_t bits;
+        std::memcpy(&bits, &value, sizeof bits);
+        return (bits & kExponent) != kExponent;
+    };
+    for (int y = begin; y < end; ++y) {
+        auto* row = reinterpret_cast<float*>(static_cast<char*>(image.data) + y * image.row_bytes);
+        int bad = 0;
+        for (int i = 0; i < values; ++i) bad |= !is_finite(row[i]);
+        if (!bad) continue;
+        std::uint8_t* codes = mask + static_cast<std::size_t>(y) * image.width;
+        for (int x = 0; x < image.width; ++x) {
+            float* pixel = row + x * image.channels;
+            if (std::all_of(pixel, pixel + image.channels, is_finite)) continue;
+            std::fill_n(pixel, image.channels, 0.0f);
+            if (codes[x] == static_cast<std::uint8_t>(Validity::valid))
+                codes[x] = static_cast<std::uint8_t>(Validity::outside);
+        }
+    }
+}
+
 }  // namespace
 
 void RegistrarOptions::validate() const {
     std::ostringstream message;
-    if (num_threads < 0)
-        message << "num_threads is " << num_threads << ", expected 0 (every core) or more";
+    if (num_threads < 0 || num_threads > kMaxThreads)
+        message << "num_threads is " << num_threads << ", expected 0 (every core) to "
+                << kMaxThreads;
     else if (!(depth_scale >= 0) || !std::isfinite(depth_scale))
         message << "depth_scale is " << depth_scale
                 << ", expected metres per unit of uint16 depth, or 0 to refuse it";
@@ -202,6 +231,7 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
         RowsTask part = task;
         part.cells = cells;
         register_rows(part, begin, end);
+        if (source.type == PixelType::f32) drop_not_finite(registered, begin, end, mask);
     });
 }
 

@@ -20,10 +20,10 @@ namespace {
 
 // Any vector of pixels.
 template <class T, int kChannels>
-HWY_INLINE void sample(const RowsTask& task, const Source& source, const Row& row, Float depth,
-                       Float x, T* out, std::uint8_t* mask) {
+HWY_INLINE void sample(const RowsTask& task, const Source& source, const AnyRow& row, Float depth,
+                       Float x, int column, T* out, std::uint8_t* mask) {
     const IntTag di;
-    const Located at = locate(row, depth, x);
+    const Located at = locate(row, depth, x, column);
     Points p = at.points();
     Mask valid = confine(*task.projector, depth, p);
     Int codes = codes_of(depth, valid);
@@ -51,7 +51,7 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
 #if HWY_TARGET != HWY_SCALAR
         const Reach reach = reach_of<T>(source, task.projector->step_along_row(width / 2, y));
 #endif
-        const Row row(task.projector->to_image, y, kHalfBack);
+        const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(task.depth, y);
         T* out = reinterpret_cast<T*>(static_cast<char*>(task.registered.data) +
                                       y * task.registered.row_bytes);
@@ -60,11 +60,11 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
             const Float along = hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
             const int left = width - x;
             if (left >= kLanes) {
-                sample<T, kChannels>(task, source, row, depth.load(x), along, out + kChannels * x,
-                                     mask + x);
+                sample<T, kChannels>(task, source, row, depth.load(x), along, x,
+                                     out + kChannels * x, mask + x);
                 return;
             }
-            sample<T, kChannels>(task, source, row, depth.load(x, left), along, pixels, codes);
+            sample<T, kChannels>(task, source, row, depth.load(x, left), along, x, pixels, codes);
             std::copy_n(pixels, kChannels * left, out + kChannels * x);
             std::copy_n(codes, left, mask + x);
         };
@@ -103,14 +103,14 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
     const int width = task.depth.view.width;
     const Float none = set(std::numeric_limits<double>::quiet_NaN());
     for (int y = begin; y < end; ++y) {
-        const Row row(task.projector->to_image, y, kHalfBack);
+        const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(task.depth, y);
         float* out = map + 2 * static_cast<std::size_t>(y) * width;
         Float along = hn::Iota(d, 0.0f);
         for (int x = 0; x < width; x += kLanes, along = hn::Add(along, set(double{kLanes}))) {
             HWY_ALIGN float u[kLanes], v[kLanes];
             const Float metres = depth.load(x, width - x);
-            Points p = locate(row, metres, along).points();
+            Points p = locate(row, metres, along, x).points();
             Mask valid = confine(*task.projector, metres, p);
             if (task.cells && task.hide)
                 valid = hn::AndNot(hidden(*task.grid, task.cells, p), valid);

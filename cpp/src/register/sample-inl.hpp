@@ -342,6 +342,22 @@ HWY_INLINE Float interpolate_in_window(const Source& source, int offset, Int ind
     return between(pair_in_window<reach>(reinterpret_cast<const T*>(upper), index),
                    pair_in_window<reach>(reinterpret_cast<const T*>(lower), index), a, b);
 }
+
+// The same in three rows: where `down`, of the second and third.
+template <class T, Reach reach>
+HWY_INLINE Float interpolate_in_three(const Source& source, int offset, Int index, Mask down,
+                                      Float a, Float b) {
+    const auto row = [&](int i) HWY_ATTR {
+        const char* from = source.data + offset + i * source.row_bytes;
+        return pair_in_window<reach>(reinterpret_cast<const T*>(from), index);
+    };
+    const auto chosen = [&](const Pair& upper, const Pair& lower) HWY_ATTR {
+        return Pair{hn::IfThenElse(down, lower.left, upper.left),
+                    hn::IfThenElse(down, lower.right, upper.right)};
+    };
+    const Pair first = row(0), second = row(1), third = row(2);
+    return between(chosen(first, second), chosen(second, third), a, b);
+}
 #endif
 
 template <class T, int kChannels>

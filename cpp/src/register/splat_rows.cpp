@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "base/kernel_targets.hpp"
 #include "register/register_rows.hpp"
@@ -41,30 +42,58 @@ HWY_INLINE void splat(const CellGrid& grid, Float depth, const Points& p,
 }
 
 #if HWY_TARGET != HWY_SCALAR
+// How far apart a vector's neighbours are, in cells: [1/2, 1], and 1 where that is not so.
+HWY_INLINE float step_of(Float u) {
+    const float step = (hn::ExtractLane(u, kLanes - 1) - hn::GetLane(u)) * (1.0f / (kLanes - 1));
+    return step >= 0.5f && step < 1 ? step : 1;
+}
+
+// From lanes that are `step` cells apart to cells, of which the first lane lies in the first, by
+// `part` from its border: each takes the lane next to its middle, those behind the last lane none.
+HWY_INLINE Int cell_by_cell(Int near, float step, float part) {
+    const FloatTag d;
+    const IntTag di;
+    const Float border = hn::Sub(hn::Iota(d, 0.0f), hn::Set(d, part));
+    const Float last = set(kLanes - 1.0);
+    const Float lane = hn::Mul(hn::Add(border, set(0.5)), hn::Set(d, 1.0f / step));
+    const Int index = to_integer(hn::Min(hn::Max(lane, hn::Zero(d)), last));
+    const Int chosen = hn::TableLookupLanes(near, hn::IndicesFromVec(di, index));
+    const Mask reached = hn::Le(border, hn::Mul(last, hn::Set(d, step)));
+    return hn::IfThenElseZero(hn::RebindMask(di, reached), chosen);
+}
+
 // The same of `count` vectors from pixel `begin` of a row on. Pixels of one surface fall into
 // neighbouring cells: all of a vector are written at once, where this moves none by more than half
 // a cell. Returns which remain to be done.
-HWY_INLINE Vectors splat_together(const CellGrid& grid, const Row& row, const DepthRow& depths,
+template <bool bends>
+HWY_INLINE Vectors splat_together(const CellGrid& grid, const AnyRow& row, const DepthRow& depths,
                                   int begin, int count, Nearness* HWY_RESTRICT cells) {
     const FloatTag d;
     const IntTag di;
     const ShortTag shorts;
     HWY_ALIGN Nearness nearness[kVectors][kLanes];
     HWY_ALIGN float u[kVectors] = {}, v[kVectors] = {};
+    const Float lane = hn::Iota(d, 0.0f);
     Vectors together = 0;
     Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
     for (int i = 0; i < count; ++i) {
         const Float depth = depths.load(begin + i * kLanes);
         depths.prefetch_next_row(begin + i * kLanes);
-        const Points p = project<false>(row, depth, along);
-        const Float start = hn::Sub(p.u, hn::Iota(d, 0.0f));
+        Points p;
+        if constexpr (bends) p = project<false>(row.bent, depth, begin + i * kLanes);
+        else p = project<false>(row.straight, depth, along);
+        // Where lenses bend, neighbours are often less than a cell apart.
+        const float step = bends ? step_of(p.u) : 1;
+        const Float start = hn::Sub(p.u, hn::Mul(lane, hn::Set(d, step)));
         u[i] = hn::ExtractLane(start, kLanes / 2);
         v[i] = hn::ExtractLane(p.v, kLanes / 2);
         const Float apart =
             hn::Max(hn::Abs(hn::Sub(start, set(u[i]))), hn::Abs(hn::Sub(p.v, set(v[i]))));
         const Mask fits = hn::And(in_front(depth, p), hn::Lt(apart, set(0.5)));
         together |= Vectors{hn::AllTrue(d, fits)} << i;
-        hn::Store(hn::DemoteTo(shorts, nearness_of(p)), shorts, nearness[i]);
+        Int near = nearness_of(p);
+        if (bends && step < 1) near = cell_by_cell(near, step, u[i] - std::floor(u[i]));
+        hn::Store(hn::DemoteTo(shorts, near), shorts, nearness[i]);
         along = hn::Add(along, set(double{kLanes}));
     }
     HWY_ALIGN std::int32_t first[kVectors];
@@ -95,18 +124,19 @@ void splat_rows(const Projector& projector, const DepthView& depth, const CellGr
                 int end, Nearness* HWY_RESTRICT cells) {
     const int width = depth.view.width;
     for (int y = begin; y < end; ++y) {
-        const Row row(projector.to_image, y, 0, grid.per_pixel_x, grid.per_pixel_y);
+        const AnyRow row(projector, y, 0, grid.per_pixel_x, grid.per_pixel_y);
         const DepthRow depths(depth, y);
         const auto splat_at = [&](int x) HWY_ATTR {
             const Float along = hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
             const Float z = depths.load(x, width - x);
-            splat(grid, z, project<false>(row, z, along), cells);
+            splat(grid, z, project<false>(row, z, along, x), cells);
         };
         int x = 0;
 #if HWY_TARGET != HWY_SCALAR
         while (width - x >= kLanes) {
             const int count = std::min(kVectors, (width - x) / kLanes);
-            Vectors left = splat_together(grid, row, depths, x, count, cells);
+            Vectors left = row.bends ? splat_together<true>(grid, row, depths, x, count, cells)
+                                     : splat_together<false>(grid, row, depths, x, count, cells);
             for (; left; left &= left - 1) splat_at(x + kLanes * first_of(left));
             x += count * kLanes;
         }

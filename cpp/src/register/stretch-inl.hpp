@@ -64,11 +64,12 @@ struct Stretch {
 HWY_INLINE bool none(Int bits) { return hn::AllTrue(IntTag(), hn::Eq(bits, hn::Zero(IntTag()))); }
 
 // Where `count` vectors lie, from pixel `begin` of row y on. `out` is where they will be written.
-template <bool fixed, bool with_cells>
-HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& depths, int y,
+template <bool fixed, bool with_cells, bool bends>
+HWY_INLINE void locate(const RowsTask& task, const AnyRow& row, const DepthRow& depths, int y,
                        int begin, int count, const char* out, int vector_bytes, Stretch& stretch) {
     const FloatTag d;
-    const Float least = hn::Set(d, task.projector->least_depth(y, task.depth.view.width));
+    const Float least =
+        hn::Set(d, bends ? 0.0f : task.projector->least_depth(y, task.depth.view.width));
     Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
     for (int i = 0; i < count; ++i) {
         UsualVector& vector = stretch.vectors[i];
@@ -76,9 +77,17 @@ HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& dep
         const Float depth = depths.load(x);
         depths.prefetch_next_row(x);
         __builtin_prefetch(out + (i + kVectors) * vector_bytes, 1);  // a stretch ahead
-        const Located at = locate(row, depth, along);
+        Located at;
+        Mask somewhere;
+        if constexpr (bends) {
+            at = locate(row.bent, depth, x);
+            somewhere = in_front(depth, at.points());
+        } else {
+            at = locate(row.straight, depth, along);
+            somewhere = hn::Gt(depth, least);
+        }
         // Elsewhere it is far outside.
-        const Float left = hn::IfThenElseZero(hn::Gt(depth, least), at.x);
+        const Float left = hn::IfThenElseZero(somewhere, at.x);
         hn::Store(left, d, vector.x);
         hn::Store(at.y, d, vector.y);
         stretch.source.start(i, left, at.y);
@@ -102,14 +111,33 @@ HWY_INLINE void locate(const RowsTask& task, const Row& row, const DepthRow& dep
     }
 }
 
+// By how many rows from `row`, where a vector's first point lies, a window of some rows begins: one
+// up if some point lies above, and in `last` at the most.
+HWY_INLINE int first_row(int row, bool above, int last) {
+    return std::clamp(above ? row - 1 : row, 0, last) - row;
+}
+
+// What is nearest in the cells of a window, at `index`.
+HWY_INLINE Int nearest_in_window(const CellGrid& grid, const Nearness* from, Int index) {
+    const IntTag di;
+    const hn::Repartition<Nearness, IntTag> pairs;
+    const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + grid.step()));
+    const Int both = hn::TableLookupLanes(
+        hn::BitCast(di, nearest),
+        hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
+    return hn::IfThenElse(hn::TestBit(index, set(1)),
+                          hn::And(both, set(static_cast<int>(0xffff0000))),
+                          hn::ShiftLeft<16>(both));
+}
+
 // Marks what is hidden of vectors of which all points lie within the source.
 template <class T, int kChannels>
 HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, Stretch& stretch,
                             T* out, std::uint8_t* mask) {
     const FloatTag d;
     const IntTag di;
-    const hn::Repartition<Nearness, IntTag> pairs;
     const CellGrid& grid = *task.grid;
+    const bool bends = task.projector->bends();
     constexpr int kWindow = 2 * kLanes, kBefore = kWindow / 8;
     stretch.cells.place<0>(kBefore, std::max(0, grid.width - kBefore), grid.height - 1, 1,
                            grid.width);
@@ -121,17 +149,22 @@ HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, St
         const Int apart =
             hn::Or(hn::Xor(y, set(stretch.cells.y[i])), hn::AndNot(set(kWindow - 1), index));
         const Nearness* from = task.cells + stretch.cells.offset[i];
-        const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + grid.step()));
-        const Int both = hn::TableLookupLanes(
-            hn::BitCast(di, nearest),
-            hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
-        const Int chosen = hn::IfThenElse(hn::TestBit(index, set(1)),
-                                          hn::And(both, set(static_cast<int>(0xffff0000))),
-                                          hn::ShiftLeft<16>(both));
-        Float nearest_there = hn::BitCast(d, chosen);
+        Float nearest_there = hn::BitCast(d, nearest_in_window(grid, from, index));
         if (!none(apart)) {
             if (!((vectors >> i) & 1)) continue;
-            nearest_there = nearest_in(grid, task.cells, hn::BitCast(d, x), hn::BitCast(d, y));
+            // Where a lens bends rows, points often come into the next one.
+            const Int below = hn::Sub(y, set(stretch.cells.y[i]));
+            const int moved =
+                first_row(stretch.cells.y[i] - kLargeBits,
+                          !hn::AllFalse(di, hn::Lt(below, hn::Zero(di))), grid.height - 2);
+            const Int row = hn::Sub(below, set(moved));
+            if (bends && none(hn::Or(hn::AndNot(set(1), row), hn::AndNot(set(kWindow - 1), index))))
+                nearest_there = hn::BitCast(
+                    d,
+                    hn::IfThenElse(hn::Ne(row, hn::Zero(di)),
+                                   nearest_in_window(grid, from + (moved + 1) * grid.width, index),
+                                   nearest_in_window(grid, from + moved * grid.width, index)));
+            else nearest_there = nearest_in(grid, task.cells, hn::BitCast(d, x), hn::BitCast(d, y));
         }
         const Mask behind = is_behind(grid, nearest_there, hn::Load(d, vector.inverse_z));
         if (hn::AllFalse(d, behind)) continue;
@@ -166,6 +199,37 @@ HWY_INLINE Vectors sample_windows(const Source& source, int count, Stretch& stre
         others |= Vectors{!none(apart)} << i;
         store(interpolate_in_window<T, reach>(source, windows.offset[i], index,
                                               hn::Load(d, vector.a), hn::Load(d, vector.b)),
+              out + i * kLanes);
+        hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
+    }
+    return others;
+}
+
+// The same of some of the vectors, in three rows of the source: where a lens bends rows, their
+// points often come into the next one.
+template <class T, Reach reach>
+HWY_INLINE Vectors sample_windows_bent(const Source& source, Vectors vectors,
+                                       const Stretch& stretch, T* out, std::uint8_t* mask) {
+    if (source.height < 3) return vectors;
+    const FloatTag d;
+    const IntTag di;
+    constexpr int kWindow = window<T, reach>();
+    const Windows& windows = stretch.source;
+    Vectors others = 0;
+    for (; vectors; vectors &= vectors - 1) {
+        const int i = first_of(vectors);
+        const UsualVector& vector = stretch.vectors[i];
+        const Int x = hn::BitCast(di, hn::Load(d, vector.x));
+        const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
+        const int moved = first_row(windows.y[i] - kLargeBits,
+                                    !hn::AllFalse(di, hn::Lt(y, hn::Zero(di))), source.height - 3);
+        const Int index = hn::Sub(x, set(windows.x[i])), row = hn::Sub(y, set(moved));
+        const Int apart = hn::Or(hn::AndNot(set(1), row), hn::AndNot(set(kWindow - 1), index));
+        others |= Vectors{!none(apart)} << i;
+        const int offset = windows.offset[i] + moved * static_cast<int>(source.row_bytes);
+        store(interpolate_in_three<T, reach>(source, offset, index,
+                                             hn::RebindMask(d, hn::Ne(row, hn::Zero(di))),
+                                             hn::Load(d, vector.a), hn::Load(d, vector.b)),
               out + i * kLanes);
         hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
     }
@@ -207,7 +271,9 @@ HWY_INLINE Vectors gather(const Source& source, Vectors vectors, const Stretch& 
             b = hn::Load(d, vector.b);
         }
         const Int left = within(x, source.width), top = within(y, source.height);
-        others |= Vectors{!none(hn::Or(hn::Xor(x, left), hn::Xor(y, top)))} << i;
+        const Int beyond = hn::Or(hn::Xor(x, left), hn::Xor(y, top));
+        others |= Vectors{!none(beyond)} << i;
+        if (hn::AllFalse(di, hn::Eq(beyond, hn::Zero(di)))) continue;  // nothing to look up
         Float values[kChannels];
         interpolate_anywhere<T>(source, left, top, a, b, values);
         store_pixels(values, out + i * kLanes * kChannels);
@@ -230,7 +296,31 @@ HWY_INLINE Vectors sample_fixed(const Source& source, int count, Stretch& stretc
         const UsualVector& vector = stretch.vectors[i];
         const Int x = hn::Sub(hn::BitCast(di, hn::Load(d, vector.x)), set(windows.x[i]));
         const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
-        const bool inside = interpolate_fixed(source, windows.offset[i], x, y, out + i * kLanes);
+        const bool inside = interpolate_fixed<1>(source, windows.offset[i], x, y, out + i * kLanes);
+        others |= Vectors{!inside} << i;
+        hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
+    }
+    return others;
+}
+
+// As sample_windows_bent.
+HWY_INLINE Vectors sample_fixed_bent(const Source& source, Vectors vectors, const Stretch& stretch,
+                                     std::uint8_t* out, std::uint8_t* mask) {
+    if (source.height < 3) return vectors;
+    const FloatTag d;
+    const IntTag di;
+    const Windows& windows = stretch.source;
+    Vectors others = 0;
+    for (; vectors; vectors &= vectors - 1) {
+        const int i = first_of(vectors);
+        const UsualVector& vector = stretch.vectors[i];
+        const Int x = hn::Sub(hn::BitCast(di, hn::Load(d, vector.x)), set(windows.x[i]));
+        const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
+        const int moved = first_row((windows.y[i] - kLargeBits) >> kFixedBits,
+                                    !hn::AllFalse(di, hn::Lt(y, hn::Zero(di))), source.height - 3);
+        const bool inside = interpolate_fixed<2>(
+            source, windows.offset[i] + moved * static_cast<int>(source.row_bytes), x,
+            hn::Sub(y, set(moved * (1 << kFixedBits))), out + i * kLanes);
         others |= Vectors{!inside} << i;
         hn::StoreU(hn::Zero(ByteTag()), ByteTag(), mask + i * kLanes);
     }
@@ -240,12 +330,31 @@ HWY_INLINE Vectors sample_fixed(const Source& source, int count, Stretch& stretc
 
 // A row for each way to locate.
 struct RowPair {
-    Row exact, fixed;
+    AnyRow exact, fixed;
 
     HWY_INLINE RowPair(const Projector& projector, int y)
-        : exact(projector.to_image, y, kHalfBack),
-          fixed(projector.to_image, y, kFixedShift, kFixedUnit, kFixedUnit) {}
+        : exact(projector, y, kHalfBack), fixed(projector, y, kFixedShift, kFixedUnit, kFixedUnit) {
+    }
 };
+
+template <bool fixed, bool with_cells>
+HWY_INLINE void locate_any(const RowsTask& task, const AnyRow& row, const DepthRow& depths, int y,
+                           int begin, int count, const char* out, int vector_bytes,
+                           Stretch& stretch) {
+    if (row.bends)
+        locate<fixed, with_cells, true>(task, row, depths, y, begin, count, out, vector_bytes,
+                                        stretch);
+    else
+        locate<fixed, with_cells, false>(task, row, depths, y, begin, count, out, vector_bytes,
+                                         stretch);
+}
+
+template <class T, Reach reach>
+HWY_INLINE Vectors sample_in(const Source& source, int count, bool bends, Stretch& stretch, T* out,
+                             std::uint8_t* mask) {
+    const Vectors others = sample_windows<T, reach>(source, count, stretch, out, mask);
+    return bends ? sample_windows_bent<T, reach>(source, others, stretch, out, mask) : others;
+}
 
 // Locates vectors of a row, `count` from pixel `begin` on, and samples them. Returns those of which
 // some points lie outside the source, or nowhere.
@@ -259,18 +368,20 @@ HWY_INLINE Vectors sample_stretch(const RowsTask& task, const Source& source, Re
 #if XCALIB_FIXED
     if constexpr (sizeof(T) == 1 && kChannels == 1) {
         if (fits_fixed(source, reach)) {
-            locate<true, with_cells>(task, row.fixed, depths, y, begin, count, to, kBytes, stretch);
+            locate_any<true, with_cells>(task, row.fixed, depths, y, begin, count, to, kBytes,
+                                         stretch);
             others = sample_fixed(source, count, stretch, out, mask);
+            if (row.fixed.bends) others = sample_fixed_bent(source, others, stretch, out, mask);
             return gather<T, 1, true>(source, others, stretch, out, mask);
         }
     }
 #endif
-    locate<false, with_cells>(task, row.exact, depths, y, begin, count, to, kBytes, stretch);
+    locate_any<false, with_cells>(task, row.exact, depths, y, begin, count, to, kBytes, stretch);
     if constexpr (kChannels == 1) {
         if (reach == Reach::one)
-            others = sample_windows<T, Reach::one>(source, count, stretch, out, mask);
+            others = sample_in<T, Reach::one>(source, count, row.exact.bends, stretch, out, mask);
         else if (reach == Reach::two)
-            others = sample_windows<T, Reach::two>(source, count, stretch, out, mask);
+            others = sample_in<T, Reach::two>(source, count, row.exact.bends, stretch, out, mask);
     }
     return gather<T, kChannels, false>(source, others, stretch, out, mask);
 }

@@ -7,7 +7,13 @@
 namespace {
 
 xcalib_camera camera_of(const xcalib::Pinhole& camera) {
-    return {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.skew};
+    xcalib_camera out{camera.width, camera.height, camera.fx,        camera.fy, camera.cx,
+                      camera.cy,    camera.skew,   XCALIB_LENS_NONE, {}};
+    const xcalib::Lens& lens = camera.lens;
+    if (lens.model() == xcalib::LensModel::brown) out.lens = XCALIB_LENS_BROWN;
+    if (lens.model() == xcalib::LensModel::fisheye) out.lens = XCALIB_LENS_FISHEYE;
+    for (int i = 0; i < 8; ++i) out.lens_coefficients[i] = lens.coefficient(i);
+    return out;
 }
 
 }  // namespace

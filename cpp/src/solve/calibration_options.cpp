@@ -8,6 +8,8 @@
 
 #include "xcalib/error.hpp"
 
+#include "xcalib/threads.hpp"
+
 namespace xcalib {
 namespace {
 
@@ -38,7 +40,8 @@ Tolerance Tolerance::parse(const std::string& option, const std::string& text) {
 
 void CalibrationOptions::validate() const {
     require(max_frames >= 1, "max_frames", max_frames, "at least 1");
-    require(num_threads >= 0, "num_threads", num_threads, "0 (every core) or more");
+    require(num_threads >= 0 && num_threads <= kMaxThreads, "num_threads", num_threads,
+            "0 (every core) to 1024");
     require(working_width >= 64, "working_width", working_width, "at least 64 px");
     require(max_iterations >= 1, "max_iterations", max_iterations, "at least 1");
     require(std::isfinite(prior_weight) && prior_weight >= 0, "prior_weight", prior_weight,
@@ -51,6 +54,8 @@ void CalibrationOptions::validate() const {
                 *reference_hfov_deg, "an angle in (0, 180) deg");
     if (reference_camera) reference_camera->validate("options: reference_camera");
     if (source_camera) source_camera->validate("options: source_camera");
+    if (reference_lens) reference_lens->validate("options: reference_lens");
+    if (source_lens) source_lens->validate("options: source_lens");
     require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
             search.max_fov_ratio, "a ratio in (1, 10]");
     require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",

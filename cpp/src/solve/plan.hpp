@@ -32,6 +32,13 @@ struct Plan {
     // All frames are solved from the coarsest level on, since flow reaches further the coarser the
     // level is; else from the level at which the start was found.
     bool from_coarsest;
+    bool estimates_lens;  // is a lens of the source tried?
+    // So many of k1 and k2 of the source move, in stage 2 at the finer levels; k1 in any case where
+    // one that is estimated bends.
+    int lens_coefficients = 0;
+    // Both focal lengths of the reference move together at the finer levels where the source's lens
+    // bends: of pinholes they are a gauge, but a lens is as strong as it is at one of them only.
+    bool fits_focal;
 };
 
 }  // namespace xcalib

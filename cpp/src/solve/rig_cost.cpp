@@ -13,11 +13,11 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 struct Block {
     int first, tangent, ambient;
 };
-constexpr Block kBlocks[] = {{kSourceLogFx, 2, 2}, {kSourceCx, 2, 2},     {kSourceSkew, 1, 1},
-                             {kRotationX, 3, 4},   {kTranslationX, 3, 3}, {kReferenceLogFx, 2, 2},
-                             {kReferenceCx, 2, 2}, {kReferenceSkew, 1, 1}};
+constexpr Block kBlocks[] = {{kSourceLogFx, 2, 2}, {kSourceCx, 2, 2},      {kSourceSkew, 1, 1},
+                             {kRotationX, 3, 4},   {kTranslationX, 3, 3},  {kReferenceLogFx, 2, 2},
+                             {kReferenceCx, 2, 2}, {kReferenceSkew, 1, 1}, {kSourceK1, 2, 2}};
 constexpr int kRotationBlock = 3;
-constexpr int kNumBlocks = 8;
+constexpr int kNumBlocks = 9;
 
 }  // namespace
 
@@ -50,14 +50,15 @@ CompressedBlock compress(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& 
     return block;
 }
 
-RigCost::RigCost(const Rig& sizes, const Parameters& free) : sizes_(sizes), free_(free) {
+RigCost::RigCost(const Rig& sizes, const Parameters& free) : rest_(sizes), free_(free) {
     for (const Block& block : kBlocks) mutable_parameter_block_sizes()->push_back(block.ambient);
     set_num_residuals(free.size() + 1);
 }
 
 std::vector<double*> RigCost::blocks(SolverParameters& p) {
-    return {p.source.log_f, p.source.center,   p.source.skew_share, p.quaternion,
-            p.translation,  p.reference.log_f, p.reference.center,  p.reference.skew_share};
+    return {p.source.log_f,     p.source.center,        p.source.skew_share,
+            p.quaternion,       p.translation,          p.reference.log_f,
+            p.reference.center, p.reference.skew_share, p.source_lens};
 }
 
 bool RigCost::Evaluate(double const* const* parameters, double* residuals,
@@ -65,8 +66,7 @@ bool RigCost::Evaluate(double const* const* parameters, double* residuals,
     SolverParameters p;
     const std::vector<double*> targets = blocks(p);
     for (int b = 0; b < kNumBlocks; ++b) std::copy_n(parameters[b], kBlocks[b].ambient, targets[b]);
-    const Rig rig = rig_from_solver(p, sizes_.reference.width, sizes_.reference.height,
-                                    sizes_.source.width, sizes_.source.height);
+    const Rig rig = rig_from_solver(p, rest_);
     const int count = num_residuals() - 1;
     if (!jacobians) {
         std::fill_n(residuals, count, 0.0);

@@ -1,6 +1,7 @@
 // What Ceres needs to know of a rig: costs of its parameters, and a manifold of its rotation.
 #pragma once
 
+#include <ceres/autodiff_manifold.h>
 #include <ceres/ceres.h>
 
 #include <vector>
@@ -30,21 +31,36 @@ class RigCost : public ceres::CostFunction {
     static std::vector<double*> blocks(SolverParameters& parameters);
 
    protected:
-    // `sizes`: a rig of the image sizes that `cost` and `linearized` are to get one of. `free`:
-    // what the solver may move, beyond which nothing is differentiated.
-    RigCost(const Rig& sizes, const Parameters& free);
+    // `rest`: the image sizes, lenses and whatever else is no parameter of the rigs that `cost` and
+    // `linearized` get. `free`: what the solver may move, beyond which nothing is differentiated.
+    RigCost(const Rig& rest, const Parameters& free);
 
     virtual double cost(const Rig& rig) const = 0;
     virtual CompressedBlock linearized(const Rig& rig, const Parameters& free) const = 0;
 
    private:
-    Rig sizes_;
+    Rig rest_;
     Parameters free_;
     // The last linearization and where it was: Ceres calls each block from one thread at a time,
     // and asks twice at the last place.
     mutable std::vector<double> last_at_;
     mutable CompressedBlock last_;
 };
+
+// Two numbers that move by the same.
+struct MoveTogether {
+    template <class T>
+    bool Plus(const T* x, const T* delta, T* x_plus_delta) const {
+        for (int i = 0; i < 2; ++i) x_plus_delta[i] = x[i] + delta[0];
+        return true;
+    }
+    template <class T>
+    bool Minus(const T* y, const T* x, T* y_minus_x) const {
+        y_minus_x[0] = 0.5 * (y[0] - x[0] + y[1] - x[1]);
+        return true;
+    }
+};
+using TogetherManifold = ceres::AutoDiffManifold<MoveTogether, 2, 1>;
 
 // A rotation that may pan and tilt but not roll: stage 1 freezes the roll.
 class PanTiltManifold : public ceres::Manifold {

@@ -33,9 +33,18 @@ class HoldCost : public ceres::CostFunction {
     std::vector<double> held_;
 };
 
+// How many of k1 and k2 move. Coarse levels hardly see what bends: there, only where the start has
+// some.
+int free_lens_coefficients(const Plan& plan, int stage, int factor, const Rig& rig) {
+    if (stage == 1 || !has_lens_parameters(rig.source.lens)) return 0;
+    if (plan.estimates_lens && rig.source.lens.bends()) return std::max(1, plan.lens_coefficients);
+    return factor < kCoarse ? plan.lens_coefficients : 0;
+}
+
 // What does not move in a stage, for Ceres.
 void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
-            const CalibrationOptions& options) {
+            const CalibrationOptions& options, const Moving& moving) {
+    const int lens = moving.lens_coefficients;
     const bool source_known = options.source_camera.has_value();
     const bool reference_free = options.optimize_reference && !options.reference_camera;
     if (stage == 1) {
@@ -47,9 +56,14 @@ void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
     for (double* block : {p.source.center, p.source.skew_share})
         if (stage == 1 || source_known) problem.SetParameterBlockConstant(block);
     if (source_known) problem.SetParameterBlockConstant(p.source.log_f);
+    if (lens == 0) problem.SetParameterBlockConstant(p.source_lens);
+    if (lens == 1) problem.SetManifold(p.source_lens, new ceres::SubsetManifold(2, {1}));
     for (double* block : {p.reference.log_f, p.reference.center, p.reference.skew_share})
-        if (!reference_free || (stage == 1 && block != p.reference.log_f))
-            problem.SetParameterBlockConstant(block);
+        if (!reference_free || (stage == 1 && block != p.reference.log_f)) {
+            if (moving.focal_together && block == p.reference.log_f)
+                problem.SetManifold(block, new TogetherManifold);
+            else problem.SetParameterBlockConstant(block);
+        }
 }
 
 // Condition number by the free parameters, with columns scaled to unit norm: it shows coupled
@@ -76,18 +90,25 @@ double condition_number(ceres::Problem& problem) {
 
 }  // namespace
 
-Parameters free_parameters(int stage, const CalibrationOptions& options) {
+Moving moving_parameters(int stage, int factor, const Plan& plan, const Rig& rig) {
+    const CalibrationOptions& options = plan.options;
+    Moving moving;
+    moving.lens_coefficients = free_lens_coefficients(plan, stage, factor, rig);
+    const bool bends = rig.source.lens.bends() && factor < kCoarse;
+    moving.focal_together =
+        plan.fits_focal && stage == 2 && (moving.lens_coefficients > 0 || bends);
     const bool source_free = !options.source_camera;
     const bool reference_free = options.optimize_reference && !options.reference_camera;
-    Parameters free(0);
     for (int p = 0; p < kNumParameters; ++p) {
         const bool late = p == kRotationZ || p == kTranslationZ || p == kSourceCx ||
                           p == kSourceCy || p == kSourceSkew || p >= kReferenceCx;
-        const bool known =
-            (p <= kSourceSkew && !source_free) || (p >= kReferenceLogFx && !reference_free);
-        if (!known && !(stage == 1 && late)) free.add(p);
+        const bool known = (p <= kSourceSkew && !source_free) ||
+                           (p >= kSourceK1 + moving.lens_coefficients) ||
+                           (p >= kReferenceLogFx && p < kSourceK1 && !reference_free &&
+                            !(moving.focal_together && p <= kReferenceLogFy));
+        if (!known && !(stage == 1 && late)) moving.parameters.add(p);
     }
-    return free;
+    return moving;
 }
 
 double seconds_now() {
@@ -135,7 +156,8 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     ceres::Problem problem;
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
-    const Parameters free = free_parameters(stage, options);
+    const Moving moving = moving_parameters(stage, level.factor, plan, rig);
+    const Parameters& free = moving.parameters;
     for (std::size_t i = 0; i < level.pairs.size() && plan.parts.images; ++i)
         problem.AddResidualBlock(
             new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free), nullptr,
@@ -153,7 +175,7 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
         hold(held.translation, 3, 0.1, p.translation);
         hold(held.quaternion, 4, 0.05, p.quaternion);
     }
-    freeze(problem, p, stage, options);
+    freeze(problem, p, stage, options, moving);
 
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_QR;
@@ -169,8 +191,7 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     if (const auto& times = level.pairs[0]->times)
         times->solver += static_cast<std::int64_t>(1e9 * own);
 
-    rig = rig_from_solver(p, rig.reference.width, rig.reference.height, rig.source.width,
-                          rig.source.height);
+    rig = rig_from_solver(p, rig);
     LevelReport report = report_on(level, stage, rig, options.num_threads);
     report.iterations = static_cast<int>(summary.iterations.size());
     report.initial_cost = summary.initial_cost;

@@ -19,8 +19,13 @@ LevelReport report_on(const Level& level, int stage, const Rig& rig, int num_thr
 // The valid share below which a fit is penalised that starts where it is `valid_share`.
 inline double share_limit(double valid_share) { return 0.8 * valid_share; }
 
-// What moves in a stage: all but the paper's frozen sets, and what is known.
-Parameters free_parameters(int stage, const CalibrationOptions& options);
+// What moves in a stage at a level: all but the paper's frozen sets, and what is known.
+struct Moving {
+    Parameters parameters = Parameters(0);
+    int lens_coefficients = 0;    // of k1 and k2
+    bool focal_together = false;  // both focal lengths of the reference move by the same
+};
+Moving moving_parameters(int stage, int factor, const Plan& plan, const Rig& rig);
 
 // Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and a prior
 // that holds `anchor`, stage 2 everything free. A pair whose valid share falls below `share_limit`

@@ -49,6 +49,13 @@ void for_frame(const char* name, int index, const Work& work) {
 
 float floor_of(const Parts& parts) { return parts.floor ? kEdgeFloor : 0.0f; }
 
+// Fills source `i`, which there must be a place for.
+void prepare_source(const ImageView& source, int i, WorkingImages& images) {
+    images.sources[i] = known_gray(source);
+    if (images.parts.normalization) images.sources[i] = normalize_percentiles(images.sources[i]);
+    images.source_edges[i] = edge_map(images.sources[i], floor_of(images.parts));
+}
+
 }  // namespace
 
 void validate_frames(const std::vector<ImageView>& references,
@@ -118,16 +125,11 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     parallel_each(static_cast<int>(count), options.num_threads, [&](int i) {
         const int frame = chosen[i];
         for_frame("reference", frame, [&] {
-            images.references[i] = resize_area(to_gray(references[frame]), width, height);
+            images.references[i] = resize_area(known_gray(references[frame]), width, height);
             if (plan.parts.normalization)
                 images.references[i] = normalize_dark(images.references[i]);
         });
-        for_frame("source", frame, [&] {
-            images.sources[i] = to_gray(sources[frame]);
-            if (plan.parts.normalization)
-                images.sources[i] = normalize_percentiles(images.sources[i]);
-        });
-        images.source_edges[i] = edge_map(images.sources[i], floor);
+        for_frame("source", frame, [&] { prepare_source(sources[frame], i, images); });
         images.reference_edges[i] = edge_map(images.references[i], floor);
         Image depth;
         for_frame("depth", frame, [&] {
@@ -147,6 +149,16 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
     });
     images.times->prepare += nanoseconds_since(start);
     return images;
+}
+
+WorkingImages with_sources(const WorkingImages& images, const std::vector<ImageView>& sources,
+                           int num_threads) {
+    const Clock::time_point start = Clock::now();
+    WorkingImages out = images;
+    parallel_each(static_cast<int>(images.size()), num_threads,
+                  [&](int i) { prepare_source(sources[i], i, out); });
+    images.times->prepare += nanoseconds_since(start);
+    return out;
 }
 
 WorkingImages WorkingImages::subset(const std::vector<std::size_t>& indices) const {
@@ -258,6 +270,22 @@ Level make_level(const WorkingImages& images, int factor, const Rig& rig, int nu
             level_images.depths[i]);
     });
     return level;
+}
+
+Level fold_of(const Level& level, std::size_t folds, std::size_t fold, bool inside) {
+    Level part = level;
+    part.pairs.clear();
+    part.weights.clear();
+    double sum = 0;
+    for (std::size_t i = 0; i < level.pairs.size(); ++i) {
+        if ((i % folds == fold) != inside) continue;
+        part.pairs.push_back(level.pairs[i]);
+        part.weights.push_back(level.weights[i]);
+        sum += level.weights[i];
+    }
+    for (double& weight : part.weights)
+        weight = sum > 0 ? weight / sum : 1.0 / static_cast<double>(part.pairs.size());
+    return part;
 }
 
 }  // namespace xcalib

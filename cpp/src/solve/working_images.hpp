@@ -45,6 +45,10 @@ WorkingImages make_working_images(const std::vector<ImageView>& references,
                                   const std::vector<ImageView>& depths,
                                   const std::vector<int>& chosen, const Plan& plan);
 
+// The same references and depths with other sources, one each, prepared as those were.
+WorkingImages with_sources(const WorkingImages& images, const std::vector<ImageView>& sources,
+                           int num_threads);
+
 // Depth without its edges, for the NEC of the finer levels: across an edge, the warp joins two
 // surfaces that the source camera may not see side by side, and the step between them moves with
 // the depth, not with the rig. Coarser levels keep them, since nearly every pixel is near one
@@ -66,6 +70,8 @@ struct Level {
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 // Its sizes only, for sources no finer than the reference.
 Level make_sizes(const WorkingImages& images, int factor, const Rig& rig);
+// Every `folds`-th pair of a level from `fold` on, or all but those.
+Level fold_of(const Level& level, std::size_t folds, std::size_t fold, bool inside);
 // The same with the NEC at any factor.
 Level make_nec_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 

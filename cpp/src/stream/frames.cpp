@@ -1,10 +1,59 @@
 #include "xcalib/stream/frames.hpp"
 
+#include <algorithm>
+#include <numeric>
 #include <regex>
 
 #include "xcalib/error.hpp"
 
 namespace xcalib {
+namespace {
+
+// Depth of some of the frames.
+class PickedDepth : public Depth {
+   public:
+    PickedDepth(DepthPointer depth, std::vector<int> indices)
+        : depth_(std::move(depth)), indices_(std::move(indices)) {}
+    Picture operator()(int index, const Picture& reference) override {
+        return (*depth_)(at(index), reference);
+    }
+    std::vector<std::filesystem::path> files(int index) const override {
+        return depth_->files(at(index));
+    }
+    bool concurrent() const override { return depth_->concurrent(); }
+    bool steadied() const override { return depth_->steadied(); }
+
+   private:
+    int at(int index) const { return indices_[static_cast<std::size_t>(index)]; }
+
+    DepthPointer depth_;
+    std::vector<int> indices_;
+};
+
+}  // namespace
+
+Frames with_lag(const Frames& frames, int lag, std::vector<int>& chosen) {
+    std::vector<int> every(frames.partners.size());
+    std::iota(every.begin(), every.end(), 0);
+    Pairing now;
+    now.references = every;
+    now.sources = frames.partners;
+    const Pairing later = with_lag(now, frames.all_sources->frames(), lag);
+    Frames out = frames;
+    out.partners = later.sources;
+    out.sources = picked(frames.all_sources, later.sources);
+    out.references = picked(frames.references, later.references);
+    out.depth = std::make_shared<PickedDepth>(frames.depth, later.references);
+    out.offset.frames += lag;
+    std::vector<int> kept;
+    for (const int index : chosen) {
+        const auto at = std::lower_bound(later.references.begin(), later.references.end(), index);
+        if (at != later.references.end() && *at == index)
+            kept.push_back(static_cast<int>(at - later.references.begin()));
+    }
+    chosen = std::move(kept);
+    return out;
+}
 
 Frame Frames::read(int index) const {
     Frame frame;

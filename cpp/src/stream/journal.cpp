@@ -8,9 +8,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <system_error>
 
+#include "base/read_file.hpp"
+#include "base/whole_file.hpp"
 #include "xcalib/error.hpp"
 #include "xcalib/stream/files.hpp"
 
@@ -28,6 +31,26 @@ std::string dumped(const Json& value) {
     return value.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
+// Of a file beside the journal, or in a folder beside it.
+bool is_inside(const Path& name) {
+    const auto parts = std::distance(name.begin(), name.end());
+    return name.is_relative() && name.has_filename() && parts <= 2 && *name.begin() != "..";
+}
+
+// Removes a file that a run has made: not what has been put in its place, nor what lies elsewhere
+// and is only linked to here, nor what a run does not write.
+void remove_made(const Path& folder, const std::string& name, std::uintmax_t size) {
+    static const std::set<std::string> kWritten = {".png", ".tiff", ".mkv", ".mp4", ".avi"};
+    const Path file = folder / name;
+    struct stat about, holder;
+    if (!kWritten.count(lower_suffix(file))) return;
+    if (Path(name).has_parent_path() &&
+        (lstat(file.parent_path().c_str(), &holder) != 0 || !S_ISDIR(holder.st_mode)))
+        return;
+    if (lstat(file.c_str(), &about) != 0 || !S_ISREG(about.st_mode)) return;
+    if (static_cast<std::uintmax_t>(about.st_size) == size) fs::remove(file);
+}
+
 // A video's frames are many: an object that keeps their order would look for each among all those
 // before, so both lists are noted as they are read.
 Unit unit_of(const std::string& line) {
@@ -42,12 +65,8 @@ Unit unit_of(const std::string& line) {
         return true;
     };
     if (!nlohmann::json::parse(line, note).is_object()) throw std::invalid_argument(line);
-    for (const auto& [name, size] : unit.files) {
-        // What --overwrite removes is ours.
-        const Path file(name);
-        if (file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end())
-            throw std::invalid_argument(name);
-    }
+    for (const auto& [name, size] : unit.files)
+        if (!is_inside(name)) throw std::invalid_argument(name);
     if (unit.frames.empty() || unit.files.empty()) throw std::invalid_argument("empty");
     return unit;
 }
@@ -88,11 +107,29 @@ Journal::Journal(Path path, const MadeWith& made_with, bool overwrite) : path_(s
     first_ = dumped({{"format", kFormat}, {"version", kVersion}, {"made_with", values}});
     try {
         open();
-        load(made_with, overwrite);
+        load(&made_with, overwrite);
     } catch (...) {
         close();
         throw;
     }
+}
+
+Journal::Journal(Path path) : path_(std::move(path)) {
+    if (!fs::exists(path_)) throw InputError(path_.string() + ": no such journal");
+    try {
+        open();
+        load(nullptr, false);
+        if (is_new_) throw InputError(path_.string() + ": nothing is noted in it");
+    } catch (...) {
+        close();
+        throw;
+    }
+}
+
+std::string Journal::made_with(const std::string& name) const {
+    for (const auto& [known, value] : made_with_)
+        if (known == name) return value;
+    return "";
 }
 
 Journal::~Journal() { close(); }
@@ -111,17 +148,38 @@ void Journal::close() {
 void Journal::append(std::vector<std::pair<std::string, long>> frames,
                      const std::vector<std::string>& files) {
     Unit unit{std::move(frames), {}};
-    Json line{{"frames", Json::object()}, {"files", Json::object()}};
-    auto& named = line["frames"].get_ref<Json::object_t&>();
-    for (const auto& [key, valid] : unit.frames) named.push_back({key, valid});  // none twice
-    for (const std::string& name : files) {
+    for (const std::string& name : files)
         unit.files.emplace_back(name, fs::file_size(path_.parent_path() / name));
-        line["files"][name] = unit.files.back().second;
-    }
+    append({std::move(unit)});
+}
+
+void Journal::claim() {
     const std::lock_guard lock(mutex_);
-    if (lseek(descriptor_, 0, SEEK_END) == 0) write(first_);
-    write(dumped(line));
-    units_.push_back(std::move(unit));
+    if (lseek(descriptor_, 0, SEEK_END) != 0) return;
+    write(first_ + "\n");
+    sync();
+    sync_to_disk(path_.has_parent_path() ? path_.parent_path() : ".");
+}
+
+void Journal::sync() const {
+    if (fdatasync(descriptor_) != 0 && errno != EINVAL)
+        throw std::system_error(errno, std::generic_category(), path_.string());
+}
+
+void Journal::append(std::vector<Unit> units) {
+    std::string lines;
+    for (const Unit& unit : units) {
+        Json line{{"frames", Json::object()}, {"files", Json::object()}};
+        auto& named = line["frames"].get_ref<Json::object_t&>();
+        for (const auto& [key, valid] : unit.frames) named.push_back({key, valid});  // none twice
+        for (const auto& [name, size] : unit.files) line["files"][name] = size;
+        lines += dumped(line) + "\n";
+    }
+    claim();
+    const std::lock_guard lock(mutex_);
+    write(lines);
+    sync();
+    std::move(units.begin(), units.end(), std::back_inserter(units_));
 }
 
 void Journal::open() {
@@ -130,7 +188,11 @@ void Journal::open() {
         made_folders_.push_back(folder);
     if (path_.has_parent_path()) fs::create_directories(path_.parent_path());
     while (descriptor_ < 0) {
-        const int file = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+        struct stat about;
+        if (lstat(path_.c_str(), &about) == 0 && !S_ISREG(about.st_mode))
+            throw InputError(path_.string() + " is no file, expected a journal, or another output");
+        const int file = ::open(
+            path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
         if (file < 0) throw std::system_error(errno, std::generic_category(), path_.string());
         if (flock(file, LOCK_EX | LOCK_NB) != 0) {
             ::close(file);
@@ -141,8 +203,7 @@ void Journal::open() {
     }
 }
 
-void Journal::write(const std::string& line) {
-    const std::string data = line + "\n";
+void Journal::write(const std::string& data) {
     const off_t start = lseek(descriptor_, 0, SEEK_END);
     const ssize_t written = ::write(descriptor_, data.data(), data.size());
     if (written == static_cast<ssize_t>(data.size())) return;
@@ -153,8 +214,8 @@ void Journal::write(const std::string& line) {
     throw std::system_error(code, std::generic_category(), path_.string());
 }
 
-void Journal::load(const MadeWith& made_with, bool overwrite) {
-    const std::string data = read_file(path_);
+void Journal::load(const MadeWith* made_with, bool overwrite) {
+    const std::string data = read_file(path_, kMaxTableBytes);
     const std::size_t end = data.rfind('\n');  // a killed run may leave half a line
     const std::string whole = data.substr(0, end == std::string::npos ? 0 : end + 1);
     std::vector<Unit> units;
@@ -179,10 +240,15 @@ void Journal::load(const MadeWith& made_with, bool overwrite) {
     }
     if (overwrite) {
         for (const Unit& unit : units)
-            for (const auto& [name, size] : unit.files) fs::remove(path_.parent_path() / name);
+            for (const auto& [name, size] : unit.files)
+                remove_made(path_.parent_path(), name, size);
     } else if (!before.is_null()) {
+        for (const auto& [name, value] : before.items())
+            if (value.is_string()) made_with_.emplace_back(name, value.get<std::string>());
+    }
+    if (!overwrite && !before.is_null() && made_with) {
         Json now = Json::object();
-        for (const auto& [name, value] : made_with) now[name] = value;
+        for (const auto& [name, value] : *made_with) now[name] = value;
         const std::string differs = differences(before, now);
         if (!differs.empty())
             throw InputError(path_.string() + ": this output was made otherwise (" + differs +
@@ -193,6 +259,7 @@ void Journal::load(const MadeWith& made_with, bool overwrite) {
             throw std::system_error(errno, std::generic_category(), path_.string());
         return;
     }
+    is_new_ = before.is_null();
     if (whole.size() < data.size() && ftruncate(descriptor_, static_cast<off_t>(whole.size())) != 0)
         throw std::system_error(errno, std::generic_category(), path_.string());
     const auto is_whole = [this](const Unit& unit) {

@@ -1,5 +1,7 @@
 #include "xcalib/stream/pairs.hpp"
 
+#include <cmath>
+#include <memory>
 #include <set>
 
 #include "xcalib/error.hpp"
@@ -24,6 +26,32 @@ void require_times(const Stream& references, const Stream& sources) {
         throw InputError("a clock offset needs times of both streams' frames; expected them");
 }
 
+// RegisteredNec of the frames of streams, which must outlive it.
+PairScore scores_of(const Rig& rig, Stream& references, Stream& sources, Depth& depth) {
+    struct State {
+        explicit State(const Rig& rig) : judge(rig) {}
+        RegisteredNec judge;
+        int last = -1;  // candidates pair one reference with many sources
+        Picture reference, metres;
+    };
+    return [&references, &sources, &depth, state = std::make_shared<State>(rig)](
+               int index, int other) -> std::optional<double> {
+        check_interrupts();
+        State& s = *state;
+        try {
+            if (index != s.last) {
+                s.last = -1;
+                s.reference = references[index];
+                s.metres = depth(index, s.reference);
+                s.last = index;
+            }
+            return s.judge(s.reference.view, sources[other].view, s.metres.view);
+        } catch (const DecodeError&) {
+            return std::nullopt;
+        }
+    };
+}
+
 }  // namespace
 
 OffsetEstimate estimate_offset(Stream& references, Stream& sources, double max_offset,
@@ -41,24 +69,8 @@ std::vector<double> offsets_around(double guess, const Stream& references, const
 RefinedOffset refine_offset(const Rig& rig, Stream& references, Stream& sources, Depth& depth,
                             const std::vector<double>& candidates, int max_frames) {
     require_times(references, sources);
-    RegisteredNec judge(rig);
-    int last = -1;  // candidates pair one reference with many sources
-    Picture reference, metres;
-    const auto score = [&](int index, int other) -> std::optional<double> {
-        check_interrupts();
-        try {
-            if (index != last) {
-                last = -1;
-                reference = references[index];
-                metres = depth(index, reference);
-                last = index;
-            }
-            return judge(reference.view, sources[other].view, metres.view);
-        } catch (const DecodeError&) {
-            return std::nullopt;
-        }
-    };
-    return refine_offset(*references.times, *sources.times, candidates, score, max_frames);
+    return refine_offset(*references.times, *sources.times, candidates,
+                         scores_of(rig, references, sources, depth), max_frames);
 }
 
 Pairs::Pairs(StreamPointer references, StreamPointer sources, const Matching& matching,
@@ -71,20 +83,26 @@ Pairs::Pairs(StreamPointer references, StreamPointer sources, const Matching& ma
         all_sources_->times = read_times(matching.source_times, *all_sources_);
     reference_list_ = all_references_->frames();
     source_list_ = all_sources_->frames();
-    if (!matching.time_offset) {
-        if (matching.method != "auto" && matching.method != "time")
-            throw InputError("a clock offset needs frames paired by time; they are by " +
-                             matching.method);
+    const bool by_time = matching.method == "time" ||
+                         (matching.method == "auto" && reference_list_.times && source_list_.times);
+    if (matching.offset.automatic && by_time) {
         if (!estimate_) estimate_ = estimate_offset(*all_references_, *all_sources_);
         notes_.push_back("clock offset: " + estimate_->line());
+    } else if (matching.offset.automatic && !clock_of(source_list_)) {
+        throw InputError(source_list_.where.at(0) +
+                         ": a clock offset needs times of both streams' frames, or source frames"
+                         " with consecutive numbers in their names; expected either");
     }
-    const double offset = estimate_ ? estimate_->offset : *matching.time_offset;
+    const double offset = estimate_ ? estimate_->offset : matching.offset.seconds;
     pairing_ =
         pair_frames(reference_list_, source_list_, matching.method, offset, matching.max_gap);
-    if (pairing_.method == "time") notes_.push_back("frames: " + pairing_.line());
+    pairing_ = with_lag(pairing_, source_list_, matching.offset.frames);
+    if (pairing_.method == "time" || pairing_.lag != 0)
+        notes_.push_back("frames: " + pairing_.line());
 }
 
 void Pairs::refine(const Rig& rig, const OpenDepth& open_depth) {
+    if (matching_.offset.automatic && !estimate_) return refine_frames(rig, open_depth);
     if (!estimate_) return;
     RefinedOffset found = refined(estimate_->peak, rig, open_depth);
     if (!found.decided && estimate_->offset != 0) {
@@ -98,6 +116,26 @@ void Pairs::refine(const Rig& rig, const OpenDepth& open_depth) {
         pairing_ =
             pair_frames(reference_list_, source_list_, "time", found.offset, matching_.max_gap);
     notes_.push_back("frames: " + pairing_.line());
+}
+
+void Pairs::refine_frames(const Rig& rig, const OpenDepth& open_depth) {
+    constexpr int kEitherWay = 6;
+    std::vector<double> candidates;
+    for (int lag = -kEitherWay; lag <= kEitherWay; ++lag) candidates.push_back(lag);
+    const FrameClock clock = clock_of(source_list_).value();
+    std::vector<double> ticks;
+    for (const int source : pairing_.sources)
+        ticks.push_back(clock.ticks[static_cast<std::size_t>(source)]);
+    const StreamPointer paired = references();
+    const DepthPointer depth = open_depth(pairing_.references);
+    const RefinedOffset found = refine_offset(ticks, clock.ticks, candidates,
+                                              scores_of(rig, *paired, *all_sources_, *depth));
+    const int lag = found.decided ? static_cast<int>(std::lround(found.offset)) : 0;
+    pairing_ = with_lag(pairing_, source_list_, lag);
+    notes_ = {!found.decided ? "clock offset: registered frames do not tell it, none is used"
+              : lag == 0     ? "clock offset: frames register best as they are paired"
+                         : "clock offset: frames register best with the source " + lateness(lag),
+              "frames: " + pairing_.line()};
 }
 
 RefinedOffset Pairs::refined(double guess, const Rig& rig, const OpenDepth& open_depth) const {

@@ -11,6 +11,7 @@
 #include "xcalib/judge/overlay.hpp"
 #include "xcalib/option_words.hpp"
 #include "xcalib/stream/interrupts.hpp"
+#include "xcalib/stream/outputs.hpp"
 
 namespace xcalib {
 namespace {
@@ -138,13 +139,23 @@ std::vector<FrameName> frame_names(const Frames& frames) {
 Registration register_frames(const Frames& frames, const Rig& rig,
                              const std::filesystem::path& output,
                              const RegistrationOptions& options, const std::string& command,
-                             const MadeWith& inputs, Codecs& codecs,
+                             const MadeWith& inputs,
+                             const std::vector<std::filesystem::path>& other_reads, Codecs& codecs,
                              const std::function<void(const Registration&)>& progress) {
+    check_output_writable(output);
+    const std::vector<FrameName> names = frame_names(frames);
+    const std::vector<std::filesystem::path> files = output_files(output, names, options.overlays);
+    std::vector<std::filesystem::path> reads = files_of(frames);
+    reads.insert(reads.end(), other_reads.begin(), other_reads.end());
+    Writes writes{files, output_folders(output, options.overlays)};
+    writes.files.push_back(journal_of(output));
+    check_apart(reads, writes);
+    check_alone(output);
     const ImageView reference = (*frames.references)[0].view, source = (*frames.sources)[0].view;
     const Rig sized = fitted(rig, reference.width, reference.height, source.width, source.height);
-    const std::vector<FrameName> names = frame_names(frames);
     Journal journal(journal_of(output), made_with(rig, output, options, command, inputs, codecs),
                     options.overwrite);
+    if (journal.is_new() && !options.overwrite) check_not_others(output, files);
     const std::unique_ptr<Sink> sink =
         open_sink(output, frame_rate(*frames.references), &journal, codecs, options.part_frames);
     const std::map<std::string, long> there = sink->begin(names);

@@ -1,10 +1,19 @@
 #include "xcalib/stream/sink.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <iterator>
+#include <mutex>
 #include <set>
 #include <stdexcept>
 
+#include "base/format.hpp"
+#include "base/whole_file.hpp"
 #include "xcalib/error.hpp"
+#include "xcalib/stream/files.hpp"
 
 namespace xcalib {
 namespace {
@@ -15,72 +24,143 @@ using Path = fs::path;
 // Codecs write these.
 constexpr const char* kVideoSuffixes[] = {".mp4", ".avi", ".mkv"};
 
-std::string lower_suffix(const Path& file) {
-    std::string suffix = file.extension().string();
-    for (char& c : suffix)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return suffix;
-}
-
 std::string kind_of(const ImageView& image) {
     static const std::map<PixelType, const char*> names = {
         {PixelType::u8, "uint8"}, {PixelType::u16, "uint16"}, {PixelType::f32, "float32"}};
     return std::string(names.at(image.type)) + (image.channels == 1 ? " gray" : " colour");
 }
 
+// What is in a folder that is one, and no link to another: real files only.
+std::vector<Path> files_in(const Path& folder) {
+    std::vector<Path> files;
+    std::error_code none;
+    if (!fs::is_directory(fs::symlink_status(folder, none))) return files;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, none))
+        if (fs::is_regular_file(entry.symlink_status(none))) files.push_back(entry.path());
+    return files;
+}
+
+// A file that goes with a video.
+Path of_video(const Path& video, const std::string& suffix) {
+    return Path(video).replace_filename(video.stem().string() + suffix);
+}
+
 class FolderSink : public Sink {
    public:
     FolderSink(Path folder, Journal* journal, Codecs& codecs)
         : folder_(std::move(folder)), journal_(journal), codecs_(codecs) {}
+    ~FolderSink() override {
+        try {
+            keep();
+        } catch (const std::exception&) {
+            // Something else has gone wrong before; what is not whole is thrown away.
+        }
+    }
     bool concurrent() const override { return true; }
 
     std::map<std::string, long> begin(const std::vector<FrameName>& frames) override {
         std::map<std::string, long> done;
-        if (!journal_ || journal_->units().empty()) return done;
-        remove_partial_files();
-        std::set<std::string> wanted;
-        for (const FrameName& frame : frames) wanted.insert(frame.key);
+        std::set<std::string> keys, names;
+        for (const FrameName& frame : frames) {
+            keys.insert(frame.key);
+            for (const char* suffix : {".png", ".tiff"}) names.insert(frame.name + suffix);
+        }
+        // What a killed run left half-written.
+        for (const char* folder : {"", "masks", "overlays"})
+            for (const Path& file : files_in(folder_ / folder))
+                if (names.count(complete_name(file.filename().string()))) fs::remove(file);
+        if (!journal_) return done;
         for (const Unit& unit : journal_->units())
             for (const auto& [key, valid] : unit.frames)
-                if (wanted.count(key)) done[key] = valid;
+                if (keys.count(key)) done[key] = valid;
         return done;
     }
 
     void write(int, const FrameName& frame, const Registered& pictures) override {
         const bool floats = pictures.image.view.type == PixelType::f32;
-        std::vector<std::string> names;
+        std::vector<WholeFile> files;
+        Unit unit{{{frame.key, valid_pixels(pictures.mask.view)}}, {}};
         const auto put = [&](const std::string& name, const Picture& picture) {
-            codecs_.write_image(folder_ / name, picture);
-            names.push_back(name);
+            const Path file = folder_ / name;
+            const std::string data = codecs_.encode_image(file, picture);
+            fs::create_directories(file.parent_path());
+            files.emplace_back(file).write(data);
+            unit.files.emplace_back(name, data.size());
         };
         put(frame.name + (floats ? ".tiff" : ".png"), pictures.image);
         put("masks/" + frame.name + ".png", pictures.mask);
         if (!pictures.overlay.empty()) put("overlays/" + frame.name + ".png", pictures.overlay);
-        if (journal_) journal_->append({{frame.key, valid_pixels(pictures.mask.view)}}, names);
+        std::unique_lock lock(mutex_);
+        std::move(files.begin(), files.end(), std::back_inserter(files_));
+        units_.push_back(std::move(unit));
+        if (units_.size() < kBatchFrames && Clock::now() - kept_ < kPatience) return;
+        lock.unlock();
+        keep();
     }
 
-    void keep() override {}
-    void finish(const std::vector<FrameName>&, const std::function<void()>&) override {}
+    // Those written since are on the disk now, have their names, and are noted: in this order.
+    void keep() override {
+        std::unique_lock lock(mutex_);
+        std::vector<WholeFile> files = std::exchange(files_, {});
+        std::vector<Unit> units = std::exchange(units_, {});
+        kept_ = Clock::now();
+        lock.unlock();
+        if (units.empty()) return;
+        keep_all(files, [&] {
+            if (journal_) journal_->claim();
+        });
+        if (journal_) journal_->append(std::move(units));
+    }
+
+    void finish(const std::vector<FrameName>&, const std::function<void()>&) override { keep(); }
 
    private:
-    // The folder is ours alone where there are units: what is partial is of a killed run.
-    void remove_partial_files() const {
-        for (const char* name : {"", "masks", "overlays"}) {
-            std::error_code none;
-            std::vector<Path> partial;
-            for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / name, none)) {
-                const std::string file = entry.path().filename().string();
-                if (file[0] == '.' && entry.path().extension() == ".partial")
-                    partial.push_back(entry.path());
-            }
-            for (const Path& file : partial) fs::remove(file);
-        }
-    }
+    using Clock = std::chrono::steady_clock;
+    static constexpr auto kPatience = std::chrono::seconds(1);
 
     Path folder_;
     Journal* journal_;
     Codecs& codecs_;
+    std::mutex mutex_;
+    std::vector<WholeFile> files_;  // written, but not kept
+    std::vector<Unit> units_;       // of these
+    Clock::time_point kept_ = Clock::now();
 };
+
+// Makes the videos of parts; returns their names.
+std::vector<std::string> join_units(const Path& video, const Path& folder,
+                                    const std::vector<Unit>& units, double rate, Codecs& codecs,
+                                    const std::function<void()>& check) {
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < units[0].files.size(); ++i) {
+        const std::string part = Path(units[0].files[i].first).filename().string();
+        const Path target = of_video(video, part.substr(part.find('.')));
+        std::vector<std::pair<Path, int>> parts;
+        for (const Unit& unit : units)
+            parts.emplace_back(video.parent_path() / unit.files.at(i).first,
+                               static_cast<int>(unit.frames.size()));
+        WholeFile file(target, folder);
+        codecs.join(parts, file.partial(), target, rate, check);
+        file.keep();
+        names.push_back(target.filename().string());
+    }
+    return names;
+}
+
+void remove_parts(const Path& video, const Path& folder, const std::vector<Unit>& units) {
+    std::error_code ignored;
+    for (const Unit& unit : units)
+        for (const auto& [name, size] : unit.files) fs::remove(video.parent_path() / name, ignored);
+    ::rmdir(folder.c_str());  // unless others have put something there
+}
+
+// Whether a unit is the whole video.
+bool is_joined(const Unit& unit, const Path& video) {
+    return std::any_of(unit.files.begin(), unit.files.end(),
+                       [&](const auto& file) { return file.first == video.filename().string(); });
+}
+
+Path parts_of(const Path& video) { return video.string() + ".parts"; }
 
 // One video; beside it NAME.masks.mkv, without loss, and NAME.overlay with its suffix.
 //
@@ -89,7 +169,7 @@ class FolderSink : public Sink {
 class VideoSink : public Sink {
    public:
     VideoSink(Path path, double rate, Journal* journal, Codecs& codecs, int part_frames)
-        : path_(std::move(path)), parts_(path_.string() + ".parts"), rate_(rate), journal_(journal),
+        : path_(std::move(path)), parts_(parts_of(path_)), rate_(rate), journal_(journal),
           codecs_(codecs), part_frames_(part_frames) {
         if (journal) units_ = journal->units();
     }
@@ -101,8 +181,7 @@ class VideoSink : public Sink {
             // Something else has gone wrong before; what is not whole is thrown away.
         }
         open_.clear();
-        std::error_code ignored;
-        fs::remove(parts_, ignored);  // only if nothing whole is in it
+        ::rmdir(parts_.c_str());  // only if it is an empty folder
     }
 
     bool concurrent() const override { return false; }
@@ -115,14 +194,23 @@ class VideoSink : public Sink {
             for (const auto& [name, size] : unit.files) ours.insert(name);
             done.insert(unit.frames.begin(), unit.frames.end());
         }
-        // What a killed run left half-written, and parts of what has changed since.
         std::error_code none;
-        std::vector<Path> others;
-        for (const fs::directory_entry& entry : fs::directory_iterator(parts_, none))
-            if (entry.is_regular_file() && is_part(entry.path().filename().string()) &&
-                !ours.count(inside(entry.path().filename().string())))
-                others.push_back(entry.path());
-        for (const Path& file : others) fs::remove(file);
+        if (fs::exists(fs::symlink_status(parts_, none)) &&
+            !fs::is_directory(fs::symlink_status(parts_, none)))
+            throw InputError(parts_.string() +
+                             " is no folder, expected one for the parts, or another output");
+        // What a killed run left half-written, or not noted, and parts of what has changed since:
+        // all that is called as a part of these frames, or of those noted, is.
+        std::set<std::string> keys;
+        for (const FrameName& frame : frames) keys.insert(frame.key);
+        for (const Unit& unit : units_) keys.insert(unit.frames[0].first);
+        for (const Path& file : files_in(parts_)) {
+            const std::string name = file.filename().string(), whole = complete_name(name);
+            const std::string& part = whole.empty() ? name : whole;
+            const bool made = keys.count(part.substr(0, part.find('.'))) ||
+                              (!whole.empty() && whole == path_.filename());
+            if (made && !ours.count(inside(name))) fs::remove(file);
+        }
         return done;
     }
 
@@ -140,7 +228,9 @@ class VideoSink : public Sink {
             const std::size_t stem = path_.stem().string().size();
             for (const auto& [target, image] : targets) {
                 const std::string name = frame.key + target.filename().string().substr(stem);
-                open_.push_back({name, codecs_.open_part(parts_ / name, target, *image, rate_)});
+                WholeFile file(parts_ / name);
+                auto writer = codecs_.open_part(file.partial(), target, *image, rate_);
+                open_.push_back({name, std::move(file), std::move(writer)});
             }
         }
         for (std::size_t i = 0; i < targets.size(); ++i) {
@@ -160,11 +250,12 @@ class VideoSink : public Sink {
     void keep() override {
         // Whatever fails, neither is closed again.
         auto frames = std::exchange(frames_, {});
-        const auto open = std::exchange(open_, {});
+        auto open = std::exchange(open_, {});
         if (frames.empty()) return;
         std::vector<std::string> names;
-        for (const Part& part : open) {
+        for (Part& part : open) {
             part.writer->close(static_cast<int>(frames.size()));
+            part.file.keep();
             names.push_back(inside(part.name));
         }
         note(std::move(frames), names);
@@ -185,44 +276,22 @@ class VideoSink : public Sink {
                                                       });
         if (!complete)
             throw std::runtime_error(parts_.string() + ": frames are missing in these parts");
-        std::vector<std::string> names;
-        for (std::size_t i = 0; i < units[0].files.size(); ++i) {
-            const std::string kind =
-                Path(units[0].files[i].first).filename().string().substr(frames[0].key.size());
-            std::vector<std::pair<Path, int>> parts;
-            for (const Unit& unit : units)
-                parts.emplace_back(path_.parent_path() / unit.files.at(i).first,
-                                   static_cast<int>(unit.frames.size()));
-            codecs_.join(parts, beside(kind), rate_, check);
-            names.push_back(beside(kind).filename().string());
-        }
-        note(std::move(all), names);
-        std::error_code ignored;
-        fs::remove_all(parts_, ignored);
+        note(std::move(all), join_units(path_, parts_, units, rate_, codecs_, check));
+        remove_parts(path_, parts_, units);
     }
 
    private:
     struct Part {
         std::string name;
-        std::unique_ptr<PartWriter> writer;
+        WholeFile file;
+        std::unique_ptr<PartWriter> writer;  // goes before its file
     };
 
-    Path beside(const std::string& suffix) const {
-        return Path(path_).replace_filename(path_.stem().string() + suffix);
-    }
+    Path beside(const std::string& suffix) const { return of_video(path_, suffix); }
     std::string inside(const std::string& part) const {
         return parts_.filename().string() + "/" + part;
     }
-    bool joined(const Unit& unit) const {
-        return std::any_of(unit.files.begin(), unit.files.end(), [this](const auto& file) {
-            return file.first == path_.filename().string();
-        });
-    }
-
-    // Named by a frame's key: 16 hexadecimal digits.
-    static bool is_part(const std::string& name) {
-        return name.find_first_not_of("0123456789abcdef") == 16;
-    }
+    bool joined(const Unit& unit) const { return is_joined(unit, path_); }
 
     // Those whose frames still follow on each other, in order.
     std::vector<Unit> fitting_units(const std::vector<FrameName>& frames) const {
@@ -295,6 +364,81 @@ void check_video_image(const Path& target, const ImageView& image) {
     if (image.width % 2 || image.height % 2)
         throw InputError(target.string() + ": the images are " + size_text(image) +
                          "; a video holds even sizes, a folder any");
+}
+
+std::vector<Path> output_files(const Path& output, const std::vector<FrameName>& frames,
+                               bool overlays) {
+    std::vector<Path> files;
+    if (is_video_output(output)) {
+        files = {output, of_video(output, ".masks.mkv")};
+        if (overlays) files.push_back(of_video(output, ".overlay" + output.extension().string()));
+        return files;
+    }
+    for (const FrameName& frame : frames) {
+        for (const char* suffix : {".png", ".tiff"})
+            files.push_back(output / (frame.name + suffix));
+        files.push_back(output / "masks" / (frame.name + ".png"));
+        if (overlays) files.push_back(output / "overlays" / (frame.name + ".png"));
+    }
+    return files;
+}
+
+std::vector<Path> output_folders(const Path& output, bool overlays) {
+    if (is_video_output(output)) return {};
+    std::vector<Path> folders = {output, output / "masks"};
+    if (overlays) folders.push_back(output / "overlays");
+    return folders;
+}
+
+void check_not_others(const Path& output, const std::vector<Path>& files) {
+    std::error_code none;
+    for (const Path& file : files)
+        if (fs::exists(fs::symlink_status(file, none)))
+            throw InputError(file.string() + " is there, and " + journal_of(output).string() +
+                             " does not say that a run made it; expected another output, or"
+                             " --overwrite");
+}
+
+void check_alone(const Path& output) {
+    if (!is_video_output(output)) return;
+    const Path folder = output.has_parent_path() ? output.parent_path() : ".";
+    for (const Path& file : files_in(folder)) {
+        const Path name = file.filename();
+        if (name.extension() != ".jsonl" || name.stem().extension() != ".register") continue;
+        const Path other = name.stem().stem();
+        if (other == output.filename() || !is_video_output(folder / other) ||
+            other.stem() != output.stem() || fs::file_size(file) == 0)
+            continue;
+        throw InputError(output.string() + " would share " +
+                         of_video(output, ".masks.mkv").filename().string() + " with " +
+                         (folder / other).string() + ", expected another name");
+    }
+}
+
+int join_parts(const Path& output, Codecs& codecs, const std::function<void()>& check) {
+    if (!is_video_output(output))
+        throw InputError(output.string() + " is no video, expected the output of a live run");
+    Journal journal(journal_of(output));
+    if (journal.made_with("live").empty())
+        throw InputError(output.string() +
+                         ": its frames are of files, expected those of a live run; the same"
+                         " `register` command resumes");
+    const std::vector<Unit> units = journal.units();
+    if (units.empty()) throw InputError(output.string() + ": no whole part of it is there");
+    if (is_joined(units.back(), output)) throw InputError(output.string() + " is joined already");
+    std::vector<std::pair<std::string, long>> all;
+    for (const Unit& unit : units) all.insert(all.end(), unit.frames.begin(), unit.frames.end());
+    const int count = static_cast<int>(all.size());
+    const double rate = std::strtod(journal.made_with("rate").c_str(), nullptr);
+    journal.append(std::move(all),
+                   join_units(output, parts_of(output), units, rate, codecs, check));
+    // What the kill left half-written is the part that was to come next.
+    for (const Path& file : files_in(parts_of(output)))
+        if (const std::string whole = complete_name(file.filename().string());
+            whole.substr(0, whole.find('.')) == format("%06d", count))
+            fs::remove(file);
+    remove_parts(output, parts_of(output), units);
+    return count;
 }
 
 Path journal_of(const Path& output) {

@@ -10,7 +10,7 @@ from importlib import import_module
 
 import click
 
-from .errors import ErrorsInOneLine
+from .errors import ErrorsInOneLine, open_standard_streams
 
 COMMANDS = ("calibrate", "demo", "evaluate", "inspect", "models", "register", "report")
 
@@ -44,4 +44,5 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point of the ``xcalib`` command."""
+    open_standard_streams()
     cli(prog_name="xcalib")

@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import click
 
+from .. import _core
 from .._core import CalibrationOptions, Rig, _option_words
 from ..depth import MeasuredDepth, NetworkOptions, PlaneDepth
 from ..footage import Matching
 from ..inputs import Inputs
 from ..pipeline import Frames
 from .depth_options import DEPTH_OPTIONS
+from .errors import warn
 from .footage_options import FOOTAGE_OPTIONS
-from .options import options
+from .options import Input, options
 
 DEFAULTS = CalibrationOptions()
 WORDS = _option_words()
 """What an option may be, by its name."""
 SEED = click.IntRange(0, 2**32 - 1)
+COUNT = click.IntRange(1, 2**31 - 1)
 
 frames_arguments = options(
-    click.argument("reference", type=click.Path(path_type=Path)),
-    click.argument("source", type=click.Path(path_type=Path)),
+    click.argument("reference", type=Input()),
+    click.argument("source", type=Input()),
     *DEPTH_OPTIONS,
     *FOOTAGE_OPTIONS,
 )
@@ -33,7 +36,7 @@ frames_arguments = options(
 quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
 threads_option = click.option(
     "--threads",
-    type=click.IntRange(min=0),
+    type=click.IntRange(0, _core.max_threads()),
     default=DEFAULTS.num_threads,
     show_default=True,
     help="Threads to use; 0 means all cores.",
@@ -46,7 +49,17 @@ colormap_option = click.option(
     help="False-colour source images: turn them back to numbers if they are (auto), never (none),"
     " or by a map of that name (inferno, jet, iron, ...).",
 )
-rig_argument = click.argument("rig_file", metavar="RIG", type=click.Path(path_type=Path))
+
+
+def load_rig(path: Path) -> Rig:
+    """The rig of a file, with a warning of what is not plausible in it."""
+    rig = Rig.load(path)
+    for line in _core.implausible(rig):
+        warn(f"{path}: {line}")
+    return rig
+
+
+rig_argument = click.argument("rig_file", metavar="RIG", type=Input())
 
 
 def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
@@ -58,7 +71,13 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
         a["depth_spec"],
         a["depth_scale"],
         Matching(
-            a["pairing"], a["time_offset"], a["max_gap"], a["reference_times"], a["source_times"]
+            a["pairing"],
+            None if a["time_offset"].automatic else a["time_offset"].seconds,
+            a["max_gap"],
+            a["reference_times"],
+            a["source_times"],
+            a["time_offset"].frames,
+            a["exif_orientation"],
         ),
         PlaneDepth(a["camera_height"], a["horizon"], a["far"], a["plane_hfov"], a["plane_roll"]),
         NetworkOptions(
@@ -79,6 +98,25 @@ def open_frames(arguments: Mapping[str, Any], threads: int, rig: Rig | None) -> 
     for note in frames.notes:
         click.echo(note, err=True)
     return frames
+
+
+def given_files(arguments: Mapping[str, Any]) -> list[Path]:
+    """The files that `frames_arguments` name, besides those of the frames."""
+    files = [value for value in arguments.values() if isinstance(value, Path)]
+    spec = arguments["depth_spec"]
+    return [*files, Path(spec), Path(spec).with_suffix(".yaml")]
+
+
+def check_writes(
+    files: Sequence[Path | None],
+    frames: Frames,
+    arguments: Mapping[str, Any],
+    *other_reads: Path | None,
+) -> None:
+    """Refuse to write to what a run on these frames reads, see `_core.check_writes`."""
+    reads = [path for path in (*other_reads, *given_files(arguments)) if path]
+    outputs = [path for path in files if path is not None]
+    _core.check_writes(outputs, frames.references, frames.sources, frames.depth, reads)
 
 
 def with_scalar_sources(frames: Frames, colormap: str) -> Frames:

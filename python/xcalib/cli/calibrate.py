@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,28 +11,36 @@ import click
 
 from .._core import (
     CalibrationOptions,
+    Lens,
     Pinhole,
-    Rig,
     Tolerance,
     _flow_arguments,
     left_out,
     report_document,
 )
 from ..flow import FlowProvider, NetworkFlow
+from ..footage import lens_of_topic
 from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
 from ..pipeline import choose_by_content, run_calibration, save_rig, with_fitted_plane
 from .arguments import (
+    COUNT,
     DEFAULTS,
     SEED,
     WORDS,
+    check_writes,
     colormap_option,
     frames_arguments,
+    load_rig,
     open_frames,
     quiet_option,
     threads_option,
     with_scalar_sources,
 )
 from .errors import NOT_TRUSTED, stop, warn
+from .options import Input, Output
+
+LAG_ROUNDS = 2
+"""Times at most that a lag is taken up, each of some frames."""
 
 
 def intrinsics(
@@ -47,6 +56,20 @@ def intrinsics(
     if not (fx > 0 and fy > 0 and all(map(math.isfinite, (fx, fy, cx, cy)))):
         raise click.BadParameter(f"{value!r}: expected finite numbers, FX and FY above 0 px")
     return fx, fy, cx, cy
+
+
+def lens_option(camera: str) -> Callable[[Any], Any]:
+    """``--reference-lens`` or ``--source-lens``."""
+    else_ = "k1 and k2 are estimated" if camera == "source" else "none"
+    return click.option(
+        f"--{camera}-lens",
+        metavar="auto|none|brown:K1,K2,P1,P2[,K3[,K4,K5,K6]]|fisheye:K1,K2,K3,K4",
+        default="auto",
+        show_default=True,
+        help=f"Known lens of the {camera} camera, OpenCV's model and coefficients, kept; auto: that"
+        f" of the initial rig, with --{camera}-intrinsics that of a bag's camera_info or none; else"
+        f" {else_}.",
+    )
 
 
 def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
@@ -65,7 +88,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "-o",
     "--output",
     metavar="RIG",
-    type=click.Path(path_type=Path),
+    type=Output(check_file_writable),
     required=True,
     help="Rig file to write (YAML).",
 )
@@ -73,7 +96,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "--frames",
     "max_frames",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=DEFAULTS.max_frames,
     show_default=True,
     help="Frames to use at most.",
@@ -101,7 +124,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 @click.option(
     "--initial",
     metavar="RIG",
-    type=click.Path(path_type=Path),
+    type=Input(),
     help="Rig file to start from.  [default: none, searched]",
 )
 @click.option(
@@ -163,6 +186,8 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     callback=intrinsics,
     help="Known intrinsics of the source camera, kept [px].  [default: none, estimated]",
 )
+@lens_option("reference")
+@lens_option("source")
 @click.option(
     "--reference-hfov",
     metavar="DEG",
@@ -180,7 +205,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 @click.option(
     "--working-width",
     metavar="PX",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=DEFAULTS.working_width,
     show_default=True,
     help="Reference width that calibration works at [px].",
@@ -203,7 +228,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "--report",
     "report_file",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=Output(check_file_writable),
     help="Also write the full report (JSON), for `xcalib report`.",
 )
 @quiet_option
@@ -224,6 +249,8 @@ def command(
     solver: str,
     reference_intrinsics: tuple[float, float, float, float] | None,
     source_intrinsics: tuple[float, float, float, float] | None,
+    reference_lens: str,
+    source_lens: str,
     reference_hfov: float | None,
     optimize_reference: bool,
     working_width: int,
@@ -267,21 +294,27 @@ def command(
     calibration.search.max_fov_ratio = max_fov_ratio
     calibration.mount = mount
     calibration.tolerance = Tolerance.parse("--tolerance", tolerance)
+    calibration.reference_lens = Lens.parse("--reference-lens", reference_lens)
+    calibration.source_lens = Lens.parse("--source-lens", source_lens)
     calibration.solver = solver
     calibration.validate()
     calibration.flow, flow = flow_of(flow_spec)
 
     def set_cameras(calibration: CalibrationOptions, reference: Image, source: Image) -> None:
         if reference_intrinsics:
-            calibration.reference_camera = Pinhole(*size_of(reference), *reference_intrinsics)
+            lens = lens_of_topic(inputs["reference"]) if reference_lens == "auto" else None
+            calibration.reference_camera = Pinhole(
+                *size_of(reference), *reference_intrinsics, lens=lens or Lens()
+            )
         if source_intrinsics:
-            calibration.source_camera = Pinhole(*size_of(source), *source_intrinsics)
+            lens = lens_of_topic(inputs["source"]) if source_lens == "auto" else None
+            calibration.source_camera = Pinhole(
+                *size_of(source), *source_intrinsics, lens=lens or Lens()
+            )
 
-    initial_rig = Rig.load(initial) if initial else None
+    initial_rig = load_rig(initial) if initial else None
     frames = open_frames(inputs, threads, initial_rig)
-    check_file_writable(output)
-    if report_file:
-        check_file_writable(report_file)
+    check_writes([output, report_file], frames, inputs, initial)
     frames = with_scalar_sources(frames, source_colormap)
 
     indices = None
@@ -307,10 +340,19 @@ def command(
             frames, calibration, result.rig, quiet, set_cameras, chosen, warn
         )
         click.echo(f"plane: --horizon {plane.horizon:g} --plane-roll {plane.roll_deg:g}")
+    for _ in range(LAG_ROUNDS):
+        lag = result.report.lag
+        if not lag.frames or frames.offset is None or not frames.offset.automatic:
+            break
+        click.echo(f"clock offset: {lag.line()}, taken up", err=True)
+        frames, chosen = frames.with_lag(lag.frames, chosen)
+        result, chosen = run_calibration(
+            frames, calibration, initial_rig, quiet, set_cameras, chosen, warn, flow
+        )
     save_rig(result.rig, output)
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")
-    if report_file:
+    if report_file is not None:
         files = [frames.references.where(index) for index in chosen]
         write_bytes(report_file, report_document(result.report, str(output), files).encode())
         click.echo(f"report: {report_file}")

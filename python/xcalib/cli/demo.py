@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..demo import run_demo
-from .arguments import DEFAULTS, SEED, quiet_option
+from .arguments import COUNT, DEFAULTS, SEED, quiet_option
 from .errors import NOT_TRUSTED, stop
 
 
@@ -25,7 +25,7 @@ from .errors import NOT_TRUSTED, stop
     "--frames",
     "num_frames",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=8,
     show_default=True,
     help="Frames to render.",
@@ -42,7 +42,7 @@ from .errors import NOT_TRUSTED, stop
 @click.option(
     "--width",
     metavar="PX",
-    type=click.IntRange(min=64),
+    type=click.IntRange(64, 2**16),
     default=None,
     show_default="as designed",
     help="Render the reference camera at this width, the source in proportion [px].",

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import io
+import os
 import sys
+import traceback
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 import click
 
-from .._core import Rig
+if TYPE_CHECKING:
+    from .._core import Rig
 
 FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
 
 
 def stop(code: int, message: str) -> NoReturn:
     """End the command with one line on stderr."""
-    label = "not to be trusted" if code == NOT_TRUSTED else "error"
-    click.echo(f"{label}: {' '.join(message.split())}", err=True)
+    say("not to be trusted" if code == NOT_TRUSTED else "error", message)
     sys.exit(code)
 
 
@@ -29,7 +33,13 @@ def require_trusted(rig: Rig, file: Path) -> None:
 
 def warn(message: str) -> None:
     """One line on stderr; the command goes on."""
-    click.echo(f"warning: {' '.join(message.split())}", err=True)
+    say("warning", message)
+
+
+def say(label: str, message: str) -> None:
+    """One line on stderr, wherever that leads: a full disk behind it changes no exit code."""
+    with contextlib.suppress(OSError):
+        click.echo(f"{label}: {' '.join(message.split())}", err=True)
 
 
 class ErrorsInOneLine(click.Group):
@@ -45,11 +55,69 @@ class ErrorsInOneLine(click.Group):
         except KeyboardInterrupt as error:
             stop(FAILED, str(error) or "interrupted")
         except OSError as error:
+            if error.filename == STDOUT:
+                sys.stdout = open_nowhere()  # at its end Python would try to write there again
             if error.errno == errno.EPIPE:
-                raise  # nobody reads our output any more: click ends quietly
+                sys.exit(FAILED)  # nobody reads our output any more
             named = f"{error.filename}: {error.strerror}" if error.filename else str(error)
             stop(WRONG_INPUT, named)
         except ValueError as error:
             stop(WRONG_INPUT, str(error))
         except (RuntimeError, MemoryError) as error:
             stop(FAILED, str(error) or "out of memory")
+        except Exception as error:  # a defect of ours: in one line too, with where to look
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            stop(
+                FAILED,
+                f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno});"
+                " please report this",
+            )
+
+
+STDOUT = "stdout"
+
+
+class NamedStdout(io.FileIO):
+    """Standard output, whose errors say that they are of it."""
+
+    def write(self, data: Any) -> int:
+        """Write bytes."""
+        try:
+            return super().write(data)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, STDOUT) from None
+
+
+def open_nowhere() -> TextIO:
+    """A stream for what nobody reads."""
+    return open(os.devnull, "w", encoding="utf-8")
+
+
+def open_standard_streams() -> None:
+    """Make sure that there are all three, and that no file can take the place of a closed one."""
+    while (file := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(file, True)
+    os.close(file)
+    if sys.stdout is None:
+        sys.stdout = open_nowhere()
+    else:
+        named = io.BufferedWriter(NamedStdout(1, "w", closefd=False))
+        sys.stdout = io.TextIOWrapper(named, sys.stdout.encoding, sys.stdout.errors)
+    if sys.stderr is None:
+        sys.stderr = open_nowhere()
+    surrogates = [name for name in sys.argv if not name.isascii() and is_undecodable(name)]
+    if surrogates:
+        stop(
+            WRONG_INPUT,
+            f"{''.join(c if c.isascii() else '?' for c in surrogates[0])}: the name is not UTF-8 (?"
+            " stands for what is not ASCII), expected another name",
+        )
+
+
+def is_undecodable(name: str) -> bool:
+    """Whether Python could not decode an argument."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return True
+    return False

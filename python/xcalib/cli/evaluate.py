@@ -8,13 +8,15 @@ from typing import Any
 
 import click
 
-from .._core import Rig
 from ..evaluate import evaluate, evaluation_document
 from ..frames import check_file_writable, write_bytes
 from ..pipeline import progress
 from .arguments import (
+    COUNT,
+    check_writes,
     colormap_option,
     frames_arguments,
+    load_rig,
     open_frames,
     quiet_option,
     rig_argument,
@@ -22,6 +24,7 @@ from .arguments import (
     with_scalar_sources,
 )
 from .errors import NOT_TRUSTED, require_trusted, stop
+from .options import Output
 
 
 @click.command("evaluate", short_help="Score registered SOURCE images against REFERENCE.")
@@ -30,7 +33,7 @@ from .errors import NOT_TRUSTED, require_trusted, stop
 @click.option(
     "--width",
     metavar="PX",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=640,
     show_default=True,
     help="Judge at the reference size divided by the least integer that makes it this wide [px].",
@@ -39,7 +42,7 @@ from .errors import NOT_TRUSTED, require_trusted, stop
     "--json",
     "json_file",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=Output(check_file_writable),
     help="Also write all scores, frame by frame (JSON).",
 )
 @colormap_option
@@ -55,10 +58,9 @@ def command(
     **inputs: Any,
 ) -> None:
     """Score the registered SOURCE against REFERENCE, beside the source that is only resized."""
-    rig = Rig.load(rig_file)
+    rig = load_rig(rig_file)
     frames = open_frames(inputs, threads, rig)
-    if json_file:
-        check_file_writable(json_file)
+    check_writes([json_file], frames, inputs, rig_file)
     frames = with_scalar_sources(frames, source_colormap)
     # Depth wants the reference image too: tee hands it on, so that it is read once.
     references, for_depth = itertools.tee(frames.references)
@@ -71,7 +73,7 @@ def command(
         threads,
     )
     click.echo(result.table())
-    if json_file:
+    if json_file is not None:
         names = [frames.references.where(index) for index in range(len(frames))]
         write_bytes(json_file, evaluation_document(result, str(rig_file), names).encode())
     if not result.valid_share:

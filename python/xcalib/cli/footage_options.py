@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 import click
 
+from .._core import TimeOffset, parse_time_offset
 from ..footage import METHODS
 from .options import file
 
 
-def clock_offset(ctx: click.Context, param: click.Parameter, value: str) -> float | None:
-    """Parse ``auto`` or seconds."""
-    if value == "auto":
-        return None
-    try:
-        seconds = float(value)
-    except ValueError:
-        seconds = math.nan
-    if not math.isfinite(seconds):
-        raise click.BadParameter(f"{value!r} is neither `auto` nor a number of seconds")
-    return seconds
+def clock_offset(ctx: click.Context, param: click.Parameter, value: str) -> TimeOffset:
+    """Parse ``auto``, seconds or source frames."""
+    return parse_time_offset(value)
 
 
 FOOTAGE_OPTIONS: tuple[Callable[[Any], Any], ...] = (
@@ -40,8 +32,8 @@ FOOTAGE_OPTIONS: tuple[Callable[[Any], Any], ...] = (
         default="0",
         show_default=True,
         callback=clock_offset,
-        help="By how much the source's clock is late [s], or `auto`: from the footage, and from its"
-        " registration where a rig is given.",
+        help="By how much the source's clock is late: seconds, source frames (`2f`), or `auto`:"
+        " from the footage, and from its registration.",
     ),
     click.option(
         "--max-gap",
@@ -55,5 +47,13 @@ FOOTAGE_OPTIONS: tuple[Callable[[Any], Any], ...] = (
             f"Times of the {name} frames: lines `name timestamp`.  [default: their own]",
         )
         for name in ("reference", "source")
+    ),
+    click.option(
+        "--exif-orientation",
+        type=click.Choice(["ignore", "apply"]),
+        default="ignore",
+        show_default=True,
+        help="Image files that say how their picture is to be turned: take pixels as they are"
+        " stored, or turn them.",
     ),
 )

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import click
 
-from .._core import Rig
 from ..footage import camera_infos, is_bag
 from ..inspection import facts_text, rig_document
-from .arguments import rig_argument
+from .arguments import load_rig, rig_argument
 
 
 @click.command("inspect")
@@ -21,5 +20,5 @@ def command(rig_file: Path, as_json: bool) -> None:
         for info in camera_infos(rig_file):
             click.echo(info.line())
         return
-    rig = Rig.load(rig_file)
+    rig = load_rig(rig_file)
     click.echo(rig_document(rig) if as_json else facts_text(rig))

@@ -11,6 +11,39 @@ import click
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
+class Input(click.Path):
+    """A file or a folder to read; an empty name would stand for the folder one is in."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The name as a path."""
+        if value == "":
+            self.fail("the name is empty, expected a file or a folder", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class Output(click.Path):
+    """A file or a folder to write: what cannot be written is refused before any work.
+
+    Parameters
+    ----------
+    check
+        `_core.check_file_writable` or `_core.check_output_writable`. It sees the name as it was
+        given: a `Path` has no slash at its end, and is never empty.
+    """
+
+    def __init__(self, check: Callable[[str], None]) -> None:
+        super().__init__(path_type=Path)
+        self._check = check
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The name as a path."""
+        self._check(str(value))
+        return super().convert(value, param, ctx)
+
+
 def options(*decorators: Callable[[Command], Command]) -> Callable[[Command], Command]:
     """Several click decorators as one."""
 
@@ -33,4 +66,4 @@ def number(
 
 def file(flag: str, text: str) -> Callable[[Command], Command]:
     """An option that takes a file."""
-    return click.option(flag, metavar="FILE", type=click.Path(path_type=Path), help=text)
+    return click.option(flag, metavar="FILE", type=Input(), help=text)

@@ -7,19 +7,20 @@ from typing import Any
 
 import click
 
-from .._core import Rig
-from ..footage import is_video
-from ..frames import InputError, check_file_writable, check_folder_writable
+from ..frames import check_output_writable
 from ..registration import RegistrationOptions, run_registration
 from .arguments import (
     WORDS,
     frames_arguments,
+    given_files,
+    load_rig,
     open_frames,
     quiet_option,
     rig_argument,
     threads_option,
 )
 from .errors import NOT_TRUSTED, require_trusted, stop
+from .options import Output
 
 
 @click.command("register", short_help="Bring SOURCE images onto the REFERENCE pixels.")
@@ -29,7 +30,7 @@ from .errors import NOT_TRUSTED, require_trusted, stop
     "-o",
     "--output",
     metavar="OUT",
-    type=click.Path(path_type=Path),
+    type=Output(check_output_writable),
     required=True,
     help="Folder to write to: images under the reference's names, and masks/. Or a video: .mp4,"
     " .avi (8 bit), .mkv (without loss, gray also 16 bit), and its masks.",
@@ -73,14 +74,11 @@ def command(
 
     Interrupted, the same command resumes: what is whole is not made again.
     """
-    rig = Rig.load(rig_file)
+    rig = load_rig(rig_file)
     frames = open_frames(inputs, threads, rig)
-    for name in ("reference", "source", "depth_spec"):
-        if Path(inputs[name]).resolve() == output.resolve():
-            raise InputError(f"output folder {output} is an input folder, expected another")
-    (check_file_writable if is_video(output) else check_folder_writable)(output)
     how = RegistrationOptions(threads, overlays, nearest, occlusion, overwrite)
-    total = run_registration(frames, rig, output, how, inputs, quiet)
+    reads = [rig_file, *given_files(inputs)]
+    total = run_registration(frames, rig, output, how, inputs, quiet, reads)
     click.echo(f"{total.summary()}: {output}")
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")

@@ -9,16 +9,20 @@ from typing import Any
 
 import click
 
+from .._core import read_file
 from ..frames import InputError
+from .options import Input
 
 
 @click.command("report", short_help="Print the report file of a calibration.")
-@click.argument("report_file", metavar="FILE", type=click.Path(path_type=Path))
+@click.argument("report_file", metavar="FILE", type=Input())
 def command(report_file: Path) -> None:
     """Print the report that `xcalib calibrate --report FILE` wrote."""
     try:
-        document = json.loads(report_file.read_text(encoding="utf-8"))
-    except ValueError:
+        document = json.loads(read_file(report_file))
+    except InputError:
+        raise
+    except (ValueError, RecursionError):
         raise InputError(f"{report_file}: not a JSON file") from None
     kind = document.get("format") if isinstance(document, dict) else None
     if kind != "xcalib-report" or document.get("version") != 1:

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frames import DecodeError, Image, InputError, decode, list_files, pair, same_aspect, size_of
+from .._core import read_npy
+from ..frames import Image, InputError, decode, list_files, pair, same_aspect, size_of
 from .provider import Depth, DepthProvider
 
 DEPTH_SUFFIXES = (".png", ".npy", ".tif", ".tiff", ".exr")
@@ -92,11 +93,7 @@ def fitting(depth: Depth, reference: Image, where: str) -> Depth:
 def _read_values(path: Path) -> NDArray[np.generic]:
     suffix = path.suffix.lower()
     if suffix == ".npy":
-        try:
-            values = np.load(path, allow_pickle=False)
-        except (ValueError, EOFError):
-            raise DecodeError(f"{path}: cannot decode, truncated or not a .npy array") from None
-        return np.asarray(values)
+        return read_npy(path).copy()
     if suffix == ".exr":
         if importlib.util.find_spec("OpenEXR"):
             return _read_exr(path)

@@ -288,8 +288,13 @@ class NetworkDepth(DepthProvider):
         entry = self._cache.load(key)
         if entry is None or entry.keys() != {"values", "camera"}:
             return None
-        focal, width = entry["camera"].tolist()
-        return _Raw(entry["values"], focal, width)
+        values, camera = entry["values"], entry["camera"]
+        if values.ndim != 2 or values.dtype != np.float32 or not values.size:
+            return None
+        if camera.shape != (2,) or camera.dtype != np.float64:
+            return None
+        focal, width = camera.tolist()
+        return _Raw(values, focal, width)
 
 
 def to_depth(values: Array, recipe: Recipe, relative: RelativeDepth | None = None) -> Depth:

@@ -18,7 +18,7 @@ from .._core import (
     read_times,
     refine_offset,
 )
-from .bag import BagImages, CameraInfo, camera_infos, is_bag
+from .bag import BagImages, CameraInfo, camera_infos, is_bag, lens_of_topic
 from .depth_topic import TopicDepth
 from .files import ImageFiles, Pages
 from .opening import Matching, open_matched_depth, open_pairs
@@ -49,6 +49,7 @@ __all__ = [
     "is_bag",
     "is_video",
     "journal_of",
+    "lens_of_topic",
     "match_depths",
     "offsets_around",
     "open_matched_depth",

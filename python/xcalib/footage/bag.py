@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import Lens
 from ..frames import DecodeError, Image, InputError, as_image, is_truncated, quiet_opencv
 from .stream import Stream, Times
 
@@ -23,6 +24,17 @@ BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 
 RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+# Lenses by the distortion models of camera_info.
+LENSES = {
+    "plumb_bob": "brown",
+    "rational_polynomial": "brown",
+    "equidistant": "fisheye",
+    "fisheye": "fisheye",
+}
+
+HEADER_STAMPS, RECORDING_TIMES = "header stamps", "times of recording"
+MAX_REPEATS = 0.05
+"""Share of a topic's header stamps that may repeat the one before."""
 
 # Type, channels, and how to get to gray or to blue-green-red.
 ENCODINGS: dict[str, tuple[type[np.generic], int, int | None]] = {
@@ -57,7 +69,17 @@ def is_bag(path: Path) -> bool:
 
 
 class BagImages(Stream):
-    """The images of one topic; their times are the header stamps, else the times of recording."""
+    """The images of one topic; their times are the header stamps, else the times of recording.
+
+    Topics that are paired go by the same of the two, see `one_clock`.
+    """
+
+    clocks: dict[str, Times]
+    """The times that can be used, by their names, the better first."""
+    clock: str
+    """The name of those in use; ``""``: none."""
+    flaws: str
+    """What is wrong with the header stamps, or ''."""
 
     def __init__(self, path: Path, topic: str) -> None:
         super().__init__()
@@ -78,13 +100,20 @@ class BagImages(Stream):
             raise InputError(f"{where}: not readable, the bag is damaged: {error}") from None
         if not stamps:
             raise InputError(f"{path}#{self.topic}: no message, expected images")
-        for nanoseconds in (stamps, self._logged):
-            times: Times = np.array(nanoseconds, np.int64) * np.float64(1e-9)
-            if (np.diff(times) > 0).all() and nanoseconds[0] > 0:
-                self.times = times
-                break
+        self.flaws, usable = _flaws(stamps)
+        self.clocks = {}
+        if usable:
+            self.clocks[HEADER_STAMPS] = np.array(stamps, np.int64) * np.float64(1e-9)
+        if (np.diff(self._logged) > 0).all():
+            self.clocks[RECORDING_TIMES] = np.array(self._logged, np.int64) * np.float64(1e-9)
+        self.use_clock(next(iter(self.clocks), ""))
         self._messages: Iterator[tuple[Any, int, bytes]] = iter(())
         self._next = -1
+
+    def use_clock(self, name: str) -> None:
+        """Go by the times of this name, of `clocks`; by none where it is not there."""
+        self.clock = name if name in self.clocks else ""
+        self.times = self.clocks.get(name)
 
     def _stamp(self, data: bytes, index: int) -> int:
         """Nanoseconds of the header, which stands first in both kinds of image."""
@@ -127,6 +156,52 @@ class BagImages(Stream):
 
     def file(self, index: int) -> Path:
         return self.path
+
+
+def _flaws(stamps: list[int]) -> tuple[str, bool]:
+    """What is wrong with header stamps, or '', and whether they can be used all the same.
+
+    A stamp that repeats is one frame's matter: pairing by time leaves the second of the two out.
+    """
+    if stamps[0] <= 0:
+        return "are not set", False
+    steps = np.diff(np.array(stamps, np.int64))
+    if (steps < 0).any():
+        return f"fall at frame {int(np.argmax(steps < 0)) + 1}", False
+    repeats = int((steps == 0).sum())
+    if not repeats:
+        return "", True
+    first = int(np.argmax(steps == 0)) + 1
+    text = f"repeat {repeats} time{'s' * (repeats > 1)}, first at frame {first}"
+    return text, repeats <= max(1, MAX_REPEATS * len(stamps))
+
+
+def one_clock(*streams: Stream) -> None:
+    """Let the topics of bags among the streams go by one kind of time.
+
+    By header stamps where all can, else by the times of recording where all can, else by none: two
+    kinds differ by what the recorder waited, which is no offset of the cameras.
+    """
+    topics = [stream for stream in streams if isinstance(stream, BagImages)]
+    for name in (HEADER_STAMPS, RECORDING_TIMES, ""):
+        if all(name in topic.clocks for topic in topics) or not name:
+            for topic in topics:
+                topic.use_clock(name)
+            break
+
+
+def clock_line(*streams: Stream) -> str:
+    """By which times the topics of bags among the streams go, where that needs saying, or ''."""
+    topics = [stream for stream in streams if isinstance(stream, BagImages)]
+    flaws = [f"the header stamps of {t.topic} {t.flaws}" for t in topics if t.flaws]
+    if not flaws:
+        return ""
+    used = {
+        HEADER_STAMPS: "header stamps are used; frames whose stamp repeats are left out",
+        RECORDING_TIMES: "the times of recording are used for all topics",
+        "": "nor do the times of recording rise: no times are used",
+    }
+    return f"clock: {'; '.join(flaws)}; {used[topics[0].clock]}"
 
 
 def _opened(path: Path) -> AnyReader:
@@ -238,14 +313,44 @@ class CameraInfo:
     D: NDArray[np.float64]
     """Coefficients of the model."""
 
+    @property
+    def lens(self) -> Lens | None:
+        """The lens of the model; None where there is no such."""
+        model = LENSES.get(self.model)
+        if not self.D.any() and model != "fisheye":
+            return Lens()
+        try:
+            return None if model is None else Lens(model, self.D.tolist())
+        except ValueError:  # not so many coefficients
+            return None
+
     def line(self) -> str:
-        """In words; the intrinsics as ``--reference-intrinsics`` takes them."""
+        """In words; the intrinsics and the lens as the options of ``calibrate`` take them."""
         fx, fy, cx, cy = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
-        bent = f"{self.model} {np.array2string(self.D, precision=6)}" if self.D.any() else "none"
+        numbers = ",".join(f"{value:.6g}" for value in self.D)
+        bent = f"distortion {self.model} {numbers}, which no lens here is"
+        if (lens := self.lens) is not None:
+            bent = f"lens {lens.model}" + (f":{numbers}" if lens.coefficients else "")
         return (
             f"{self.topic}: {self.width}x{self.height} px,"
-            f" FX,FY,CX,CY {fx:.6g},{fy:.6g},{cx:.6g},{cy:.6g} px, distortion {bent}"
+            f" FX,FY,CX,CY {fx:.6g},{fy:.6g},{cx:.6g},{cy:.6g} px, {bent}"
         )
+
+
+def lens_of_topic(name: str | Path) -> Lens | None:
+    """The lens that the camera_info beside a topic of images, ``BAG#TOPIC``, has; None if none."""
+    path, _, topic = str(name).partition("#")
+    if not is_bag(Path(path)):
+        return None
+    try:
+        infos = camera_infos(path)
+    except InputError:
+        return None
+    for info in infos:
+        beside = info.topic.rpartition("/")[0]
+        if f"{topic}/".startswith(f"{beside}/") or (not topic and len(infos) == 1):
+            return info.lens
+    return None
 
 
 def camera_infos(path: str | Path) -> list[CameraInfo]:

@@ -16,10 +16,9 @@ import av
 import numpy as np
 from av import library_versions
 
-from ..frames import Image, size_of, write_image
-from ..whole_file import WholeFile
+from ..frames import Image, encode_image, size_of
 
-__all__ = ["Encoder", "encoder_name", "join", "write_image"]
+__all__ = ["Encoder", "encode_image", "encoder_name", "join"]
 
 # Container, codec and the pixels it stores; None: as they are. The quantizer of the lossy ones is
 # fixed, so that a frame's quality does not depend on where a part began.
@@ -41,12 +40,12 @@ def encoder_name() -> str:
 
 
 class Encoder:
-    """Compresses frames into a part of a video: a Matroska file, whole once it is closed.
+    """Compresses frames into a part of a video: a Matroska file, complete once it is closed.
 
     Parameters
     ----------
-    path
-        The part.
+    file
+        To be written, under a name that is not yet the part's.
     target
         The video it becomes a part of: its suffix says the codec, and messages name it.
     first
@@ -55,14 +54,13 @@ class Encoder:
         Frames a second.
     """
 
-    def __init__(self, path: Path, target: Path, first: Image, rate: float) -> None:
-        self.path, self.target = path, target
-        self._file = WholeFile(path)
+    def __init__(self, file: Path, target: Path, first: Image, rate: float) -> None:
+        self.file, self.target = file, target
         self._pixels = _PIXELS[str(first.dtype), first.ndim]
         self._frames = 0
         stored = _KINDS[target.suffix.lower()][2]
         with _named(target):
-            self._container = av.open(_name(self._file.partial), "w", format="matroska")
+            self._container = av.open(_name(file), "w", format="matroska")
             self._stream = _added(self._container, target, rate)
             self._stream.width, self._stream.height = size_of(first)
             self._stream.pix_fmt = stored or _LOSSLESS[self._pixels]
@@ -76,65 +74,65 @@ class Encoder:
         self._frames += 1
 
     def close(self, frames: int) -> None:
-        """Make the part whole; OSError if it does not hold at least ``frames`` frames then."""
+        """Complete the file; OSError if it does not hold at least ``frames`` frames then."""
         with _named(self.target):
             self._container.mux(self._stream.encode(None))
             self._container.close()
-        _check_count(self._file.partial, frames, self.target)
-        self._file.keep()
+        _check_count(self.file, frames, self.target)
 
-    def discard(self) -> None:
-        """Leave nothing behind, unless it was closed."""
+    def end(self) -> None:
+        """Let go of the file, complete or not."""
         with contextlib.suppress(OSError, ValueError, av.FFmpegError):
             self._container.close()
-        self._file.discard()
 
 
 def join(
-    parts: Sequence[tuple[Path, int]], target: Path, rate: float, check: Callable[[], None]
+    parts: Sequence[tuple[Path, int]],
+    file: Path,
+    target: Path,
+    rate: float,
+    check: Callable[[], None],
 ) -> None:
-    """Write a video, whole or not at all, of the compressed frames of its parts.
-
-    Until it is whole it is with the parts.
+    """Write a video of the compressed frames of its parts.
 
     Parameters
     ----------
     parts
         Files of `Encoder`, and how many frames to take of each.
+    file
+        To be written, under a name that is not yet the video's.
     target
-        The video.
+        The video: its suffix says the container, and messages name it.
     rate
         Frames a second.
     check
         Called for every frame; what it raises ends the writing.
     """
-    beside_parts = parts[0][0].with_name(f"{target.name}.partial")
     step = 1 / _fraction(rate)
     frames = 0
-    with WholeFile(target, beside_parts) as partial:
-        with _named(target), av.open(_name(partial), "w", format=_format(target)) as container:
-            stream = None
-            for path, count in parts:
-                with av.open(_name(path)) as part:
-                    source = part.streams.video[0]
-                    if stream is None:
-                        # By its settings: a stream made after a template has no rate, which
-                        # readers then guess.
-                        stream = _added(container, target, rate)
-                        stream.width, stream.height = source.width, source.height
-                        stream.pix_fmt = source.pix_fmt
-                        container.start_encoding()
-                    if source.codec_context.extradata != stream.codec_context.extradata:
-                        raise OSError(f"{path}: coded otherwise than {target.name} would be now")
-                    for packet in _packets(part, count):
-                        check()
-                        packet.stream = stream
-                        packet.time_base = step
-                        packet.pts = packet.dts = frames
-                        packet.duration = 1
-                        container.mux(packet)
-                        frames += 1
-        _check_count(partial, sum(count for _, count in parts), target)
+    with _named(target), av.open(_name(file), "w", format=_format(target)) as container:
+        stream = None
+        for path, count in parts:
+            with av.open(_name(path)) as part:
+                source = part.streams.video[0]
+                if stream is None:
+                    # By its settings: a stream made after a template has no rate, which readers
+                    # then guess.
+                    stream = _added(container, target, rate)
+                    stream.width, stream.height = source.width, source.height
+                    stream.pix_fmt = source.pix_fmt
+                    container.start_encoding()
+                if source.codec_context.extradata != stream.codec_context.extradata:
+                    raise OSError(f"{path}: coded otherwise than {target.name} would be now")
+                for packet in _packets(part, count):
+                    check()
+                    packet.stream = stream
+                    packet.time_base = step
+                    packet.pts = packet.dts = frames
+                    packet.duration = 1
+                    container.mux(packet)
+                    frames += 1
+    _check_count(file, sum(count for _, count in parts), target)
 
 
 def _name(path: Path) -> str:

@@ -60,7 +60,7 @@ class ImageFiles(Stream):
 
 def matching_files(pattern: Path) -> list[Path]:
     """Image files of a pattern with ``*``, ``?``, ``[...]``, or a number as in ``%06d``."""
-    number = re.fullmatch(r"(.*)%(0\d+)?d(.*)", pattern.name)
+    number = re.fullmatch(r"(.*)%(0\d{1,3})?d(.*)", pattern.name)
     if number:
         before, width, after = number[1], number[2], number[3]
         digits = rf"\d{{{int(width)},}}" if width else r"\d+"
@@ -117,6 +117,6 @@ def open_files(path: Path) -> Stream | None:
         return ImageFiles(list_files(path))
     if path.is_file():
         return Pages(path) if path.suffix.lower() in (".tif", ".tiff") else None
-    if re.search(r"[*?\[]|%(0\d+)?d", path.name):
+    if re.search(r"[*?\[]|%(0\d{1,3})?d", path.name):
         return ImageFiles(matching_files(path))
     return None

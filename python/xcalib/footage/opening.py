@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from .._core import OffsetEstimate, Pairs
+from .._core import OffsetEstimate, Pairs, oriented
 from ..depth import (
     DEPTH_SUFFIXES,
     PNG_SCALE,
@@ -18,7 +18,8 @@ from ..depth import (
     open_depth,
 )
 from ..depth.points import POINT_SUFFIXES
-from ..frames import Image, list_files
+from ..frames import Image, InputError, list_files
+from .bag import BagImages, one_clock
 from .depth_topic import TopicDepth, is_depth_topic
 from .pairing import match_depth_stream, match_depths
 from .sources import open_stream
@@ -37,6 +38,10 @@ class Matching:
     reference_times: Path | None = None
     """Table of `read_times`; None: what the stream itself says."""
     source_times: Path | None = None
+    frame_offset: int = 0
+    """By how many of its frames the source is late beyond `time_offset`."""
+    exif_orientation: str = "ignore"
+    """What of image files that say how their picture is to be turned: ``ignore`` or ``apply``."""
 
 
 @dataclass(frozen=True)
@@ -60,15 +65,20 @@ def open_pairs(
 ) -> Pairs:
     """Open and pair what REFERENCE and SOURCE name, see `Pairs`."""
     m = matching or Matching()
+    references, sources = open_stream(reference), open_stream(source)
+    one_clock(references, sources)
+    if m.exif_orientation == "apply":
+        references, sources = oriented(references), oriented(sources)
     return Pairs(
-        open_stream(reference),
-        open_stream(source),
+        references,
+        sources,
         m.method,
         m.time_offset,
         m.max_gap,
         m.reference_times,
         m.source_times,
         estimate,
+        m.frame_offset,
     )
 
 
@@ -87,6 +97,13 @@ def open_matched_depth(
     folder = Path(spec)
     if is_depth_topic(spec):
         stream = open_stream(spec)
+        if isinstance(references, BagImages) and isinstance(stream, BagImages):
+            if references.clock not in ("", *stream.clocks):
+                raise InputError(
+                    f"{spec}: the reference frames go by {references.clock}, which the depth topic"
+                    f" cannot: its header stamps {stream.flaws}; expected one clock"
+                )
+            stream.use_clock(references.clock)
         matched = match_depth_stream(references, used, stream)
         measured = measured or MeasuredDepth()
         provider = measured.open(spec, []) or TopicDepth(stream)

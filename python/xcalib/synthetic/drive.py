@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from .._core import Rig
-from ..reprojection import targets
+from ..reprojection import inside_image, targets
 from .arguments import require
+from .canvas import Canvas
 from .raster import Raster, View
 from .rigs import rotation_z, turned_towards
 from .street import build
@@ -101,6 +102,7 @@ class Street:
         longest = max(3 * rig.reference.width * rig.reference.height, self._pattern.size)
         stretch = np.random.default_rng([seed, 0xA01]).standard_normal(longest * 5 // 4, np.float32)
         self._noise_stretch = stretch
+        self._canvases: dict[tuple[str, int], Canvas] = {}
 
     def __len__(self) -> int:
         return self._num_frames
@@ -152,19 +154,46 @@ class Street:
         depth : (h, w) float32 [m], at pixel centres, in this camera; 0 on a sky of unknown depth
         """
         require(modality in ("visible", "thermal"), "modality", modality, "visible or thermal")
-        centres = Raster(self._scene, self._view(index, camera), 1, index)
-        centres.find_visible(np.float64)
-        return self._image(index, modality, camera), centres.depth()
+        depth, _ = self._seen(index, camera)
+        return self._image(index, modality, camera), depth
+
+    def _seen(self, index: int, camera: str) -> tuple[Array, Array]:
+        """Depth [m] and the id of the face, at the pixel centres of a camera."""
+        view = self._view(index, camera)
+        canvas = self._canvas(camera, 1)
+        raster = Raster(self._scene, canvas.view(view) if canvas else view, 1, index)
+        raster.find_visible(np.float64)
+        if canvas:
+            return canvas.seen(raster)
+        return raster.depth(), raster.ids[raster.faces]
+
+    def _canvas(self, camera: str, samples: int) -> Canvas | None:
+        """What a camera is rendered on; None without a lens."""
+        pinhole = self.rig.reference if camera == "reference" else self.rig.source
+        if not pinhole.lens.bends:
+            return None
+        if (camera, samples) not in self._canvases:
+            self._canvases[camera, samples] = Canvas(pinhole, samples)
+        return self._canvases[camera, samples]
 
     def _image(self, index: int, modality: str, camera: str) -> Array:
         view = self._view(index, camera)
-        samples = Raster(self._scene, view, _SAMPLES, index)
+        canvas = self._canvas(camera, _SAMPLES)
+        samples = (
+            Raster(self._scene, canvas.view(view), 1, index)
+            if canvas
+            else Raster(self._scene, view, _SAMPLES, index)
+        )
         samples.find_visible(np.float32)
         if modality == "thermal":
             # 16 bits keep the average of the samples finer than a level.
             fine = samples.paint("thermal").astype(np.uint16) << 8
+        else:
+            fine = self._lit(samples, index) if self.night else samples.paint("day")
+        if canvas:
+            fine = canvas.bent(fine)
+        if modality == "thermal":
             return cv2.GaussianBlur(_averaged(fine, view) / np.float32(256), (0, 0), _BLUR)
-        fine = self._lit(samples, index) if self.night else samples.paint("day")
         return _averaged(fine, view).astype(np.float32)
 
     def occluded(self, index: int) -> Array:
@@ -173,10 +202,15 @@ class Street:
         Found by ray casting: something else lies on the straight line from the source camera to the
         very point. False where the point lies outside the source image, or is sky of unknown depth.
         """
-        reference = Raster(self._scene, self._view(index, "reference"), 1, index)
-        reference.find_visible(np.float64)
-        source = Raster(self._scene, self._view(index, "source"), 1, index)
-        return source.hides(targets(self.rig, reference.depth()), reference.ids[reference.faces])
+        depth, owners = self._seen(index, "reference")
+        seen = targets(self.rig, depth)
+        view = self._view(index, "source")
+        if canvas := self._canvas("source", 1):
+            inside = inside_image(seen, view.width, view.height)
+            straight = Rig(self.rig.reference, canvas.camera, self.rig.R, self.rig.t)
+            seen = np.where(inside[..., None], targets(straight, depth), np.nan)
+            view = canvas.view(view)
+        return Raster(self._scene, view, 1, index).hides(seen, owners)
 
     def _view(self, index: int, camera: str) -> View:
         require(camera in ("reference", "source"), "camera", camera, "reference or source")

@@ -260,6 +260,19 @@ class Raster:
             depth[ys, xs] = self.view.sky_depth / (self.view.sky_z @ rays)
         return depth
 
+    def depth_of(self, faces: Array, x: Array, y: Array) -> Array:
+        """(N,) [m] of these faces where they are seen at sample coordinates x, y; as depth()."""
+        at = np.stack([x, y, np.ones(len(x))])
+        solid = (faces >= 0) & (faces < self.num_solid)
+        depth = np.zeros(len(faces))
+        w = np.einsum("in,ni->n", at[:, solid], self.A[faces[solid], 2])
+        depth[solid] = 1 / np.maximum(w, 1e-6)
+        if self.view.sky_depth > 0:
+            sky = faces >= self.num_solid
+            rays = np.linalg.inv(self.K) @ at[:, sky]
+            depth[sky] = self.view.sky_depth / (self.view.sky_z @ rays)
+        return depth
+
     def points_in_world(self) -> list[Array]:
         """World x, y and z [m] of what every sample sees, each (h, w) float32; the sky is far."""
         z = 1 / np.maximum(self.inverse_depth, np.float32(1e-4))

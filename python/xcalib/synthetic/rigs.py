@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import Pinhole, Rig
+from .._core import Lens, Pinhole, Rig
+from ..reprojection import rays_at
 from .arguments import require
 
 Array = NDArray[Any]
@@ -24,6 +25,8 @@ def random_rig(
     max_offset: float = 0.3,
     max_roll_deg: float = 5.0,
     max_baseline: float = 0.5,
+    reference_lens: Lens | None = None,
+    source_lens: Lens | None = None,
 ) -> Rig:
     """A random but plausible rig; the same seed gives the same rig.
 
@@ -33,7 +36,8 @@ def random_rig(
     width, height, source_width, source_height : int
         Image sizes [px].
     hfov_deg : (float, float)
-        Range of both horizontal fields of view [deg]; the reference's is uniform in it.
+        Range of both horizontal fields of view [deg], as the lenses have them; the reference's is
+        uniform in it.
     fov_ratio : (float, float)
         Range of source over reference field of view, log-uniform, as far as `hfov_deg` admits.
     max_offset : float
@@ -44,6 +48,8 @@ def random_rig(
     max_baseline : float
         Length of the translation, uniform from 0.02 m to this; mostly lateral, |t_z| <= 0.3 of it.
         [m]
+    reference_lens, source_lens : Lens or None
+        What the cameras look through; the rig is otherwise drawn alike.
 
     Returns
     -------
@@ -53,7 +59,8 @@ def random_rig(
     Raises
     ------
     ValueError
-        An argument out of range, or no field of view that satisfies both ranges.
+        An argument out of range, no field of view that satisfies both ranges, or one that a lens
+        does not show.
     """
     sizes = {"width": width, "height": height}
     sizes |= {"source_width": source_width, "source_height": source_height}
@@ -68,11 +75,12 @@ def random_rig(
 
     rng = np.random.default_rng([seed, 0x416])
     reference_hfov, source_hfov = _draw_hfovs(rng, hfov_deg, fov_ratio)
-    reference = _draw_camera(rng, width, height, reference_hfov)
-    source = _draw_camera(rng, source_width, source_height, source_hfov)
+    reference = _draw_camera(rng, width, height, reference_hfov, reference_lens)
+    source = _draw_camera(rng, source_width, source_height, source_hfov, source_lens)
     offset = rng.uniform(-max_offset, max_offset, 2) * (width, height)
     axis_at = np.array([(width - 1) / 2, (height - 1) / 2]) + offset
-    axis = np.linalg.inv(np.asarray(reference.K, np.float64)) @ (*axis_at, 1.0)
+    axis = np.append(rays_at(reference, axis_at[:1], axis_at[1:])[0], 1.0)
+    require(np.isfinite(axis).all(), "max_offset", max_offset, "what the reference's lens shows")
     roll = np.deg2rad(rng.uniform(-max_roll_deg, max_roll_deg))
     R = rotation_z(roll) @ turned_towards(axis).T
     across, along = rng.uniform(-0.3, 0.3, 2)
@@ -107,19 +115,27 @@ def _draw_hfovs(
     )
 
 
-def _draw_camera(rng: np.random.Generator, width: int, height: int, hfov: float) -> Pinhole:
+def _draw_camera(
+    rng: np.random.Generator, width: int, height: int, hfov: float, lens: Lens | None
+) -> Pinhole:
     offset = rng.uniform(-0.01, 0.01, 2) * width
-    return _camera(
-        width, height, hfov, (float(offset[0]), float(offset[1])), float(rng.uniform(0.995, 1.005))
-    )
+    aspect = float(rng.uniform(0.995, 1.005))
+    return _camera(width, height, hfov, (float(offset[0]), float(offset[1])), aspect, lens)
 
 
 def _camera(
-    width: int, height: int, hfov: float, offset: tuple[float, float], aspect: float
+    width: int,
+    height: int,
+    hfov: float,
+    offset: tuple[float, float],
+    aspect: float,
+    lens: Lens | None = None,
 ) -> Pinhole:
     fx = width / 2 / float(np.tan(np.deg2rad(hfov) / 2))
+    if lens is not None:
+        fx = Pinhole.from_hfov(width, height, hfov, lens).fx
     cx, cy = (width - 1) / 2 + offset[0], (height - 1) / 2 + offset[1]
-    return Pinhole(width, height, fx, fx * aspect, cx, cy, 0.0)
+    return Pinhole(width, height, fx, fx * aspect, cx, cy, 0.0, lens or Lens())
 
 
 def rotation_z(angle: float) -> Array:

@@ -56,13 +56,15 @@ struct Pairing {
     int dropped_references = 0, dropped_sources = 0;  // frames without a partner
     double gap = 0.0;     // median distance in time, the offset allowed for [s]
     double offset = 0.0;  // by how much the source's clock is late [s]
+    int lag = 0;          // by how many of its frames the source is late beyond that
 
     std::string line() const;  // what happened
 };
 
 // Nearest times, one to one and in order, at most `max_gap` apart [s] (by default half the larger
 // median period). The frames of the stream with fewer of them choose, one after the other, among
-// the frames behind the last one chosen. Throws InputError where no two are near.
+// the frames behind the last one chosen; of those of one time only the first. Throws InputError
+// where no two are near.
 Pairing pair_times(const std::vector<double>& references, const std::vector<double>& sources,
                    double offset = 0.0, std::optional<double> max_gap = std::nullopt);
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "xcalib/export.hpp"
+#include "xcalib/footage/sequence.hpp"
 #include "xcalib/stream/stream.hpp"
 
 namespace XCALIB_EXPORT xcalib {
@@ -36,10 +37,17 @@ struct Frame {
 struct Frames {
     StreamPointer references, sources;  // as many of both
     DepthPointer depth;
+    StreamPointer all_sources = nullptr;  // with those that have no partner; null: not known
+    std::vector<int> partners = {};       // of the references, among them
+    TimeOffset offset = {};               // that they were paired with
 
     int size() const { return references->size(); }
     Frame read(int index) const;
 };
+
+// The frames with the sources `lag` frames later, without those that have none; `chosen`, of the
+// frames, becomes the same references' indices.
+Frames with_lag(const Frames& frames, int lag, std::vector<int>& chosen);
 
 // Frames in memory.
 struct LoadedFrames {

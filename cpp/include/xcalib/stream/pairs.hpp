@@ -10,6 +10,7 @@
 #include "xcalib/camera.hpp"
 #include "xcalib/export.hpp"
 #include "xcalib/footage/clock_offset.hpp"
+#include "xcalib/footage/sequence.hpp"
 #include "xcalib/stream/frames.hpp"
 
 namespace XCALIB_EXPORT xcalib {
@@ -17,8 +18,8 @@ namespace XCALIB_EXPORT xcalib {
 // How to pair two streams: pair_frames(), and where times come from.
 struct Matching {
     std::string method = "auto";
-    std::optional<double> time_offset = 0.0;  // [s] the source's clock is late; none: estimated
-    std::optional<double> max_gap;            // [s]; none: half the slower stream's period
+    TimeOffset offset = {};
+    std::optional<double> max_gap;  // [s]; none: half the slower stream's period
     std::filesystem::path reference_times, source_times;  // of read_times(); empty: the stream's
 };
 
@@ -34,18 +35,26 @@ class Pairs {
 
     // Pairs anew with the offset at which frames register best with the rig, refine_offset().
     // Without an estimated offset the pairs stay as they are, and so they do where the registered
-    // frames tell neither around the estimate nor around 0.
+    // frames tell neither around the estimate nor around 0. Sequences without times are looked at
+    // up to 6 frames either way.
     void refine(const Rig& rig, const OpenDepth& open_depth);
 
     StreamPointer references() const { return picked(all_references_, pairing_.references); }
     StreamPointer sources() const { return picked(all_sources_, pairing_.sources); }
 
     const StreamPointer& all_references() const { return all_references_; }
+    const StreamPointer& all_sources() const { return all_sources_; }
     const FrameList& reference_list() const { return reference_list_; }  // of all of them
     const Pairing& pairing() const { return pairing_; }
     const std::vector<std::string>& notes() const { return notes_; }  // for the user, a line each
 
+    // That they are paired with.
+    TimeOffset offset() const {
+        return {matching_.offset.automatic, pairing_.offset, pairing_.lag};
+    }
+
    private:
+    void refine_frames(const Rig& rig, const OpenDepth& open_depth);
     RefinedOffset refined(double guess, const Rig& rig, const OpenDepth& open_depth) const;
 
     StreamPointer all_references_, all_sources_;

@@ -49,14 +49,17 @@ Registered registered(const Registrar& registrar, const Picture& reference, cons
 std::vector<FrameName> frame_names(const Frames& frames);
 
 // Registers all frames that an earlier run has not written. `command` names the caller, `inputs`
-// are all else that it made `frames` with: an output of others is refused. `progress` is called in
+// are all else that it made `frames` with: an output of others is refused. `other_reads` are the
+// files it read besides those of the frames: nothing that is read is written to. `progress` is
+// called in
 // the caller's thread after frames, and a few times a second, and may throw. Throws Interrupted on
 // SIGINT or SIGTERM (interrupts.hpp); what is written then is whole, and the same call goes on from
 // there.
 Registration register_frames(const Frames& frames, const Rig& rig,
                              const std::filesystem::path& output,
                              const RegistrationOptions& options, const std::string& command,
-                             const MadeWith& inputs, Codecs& codecs,
+                             const MadeWith& inputs,
+                             const std::vector<std::filesystem::path>& other_reads, Codecs& codecs,
                              const std::function<void(const Registration&)>& progress);
 
 }  // namespace xcalib

@@ -19,8 +19,7 @@ namespace XCALIB_EXPORT xcalib {
 
 // -- What compresses ------------------------------------------------------------------------------
 
-// Compresses frames into a part of a video: a file that is whole once it is closed. Destroyed
-// before that, it leaves nothing behind.
+// Compresses frames into a part of a video.
 class PartWriter {
    public:
     virtual ~PartWriter() = default;
@@ -30,28 +29,27 @@ class PartWriter {
 };
 
 // What the library that does the work is asked for. Errors of files are std::system_error with the
-// path. `target` is the video that a part becomes a part of: its suffix says the codec, and
-// messages name it. Rates are in frames a second.
+// path that messages are to name. Files are written by the names they are given, which are not yet
+// those of the output: what becomes of them is for the sink. `target` is the video that a part
+// becomes a part of: its suffix says the codec, and messages name it. Rates are in frames a second.
 class Codecs {
    public:
     virtual ~Codecs() = default;
 
-    // Writes an image file of the kind that the suffix says, .png or .tiff, whole or not at all.
-    // From any thread.
-    virtual void write_image(const std::filesystem::path& file, const Picture& image) = 0;
+    // An image file of the kind that the suffix says, .png or .tiff. From any thread.
+    virtual std::string encode_image(const std::filesystem::path& file, const Picture& image) = 0;
 
     // The library that compresses videos, and its version: parts of a video are of one.
     virtual std::string encoder_name() = 0;
     // `first`: an image like all that follow.
-    virtual std::unique_ptr<PartWriter> open_part(const std::filesystem::path& part,
+    virtual std::unique_ptr<PartWriter> open_part(const std::filesystem::path& file,
                                                   const std::filesystem::path& target,
                                                   const Picture& first, double rate) = 0;
-    // Writes a video, whole or not at all, of the compressed frames of its parts, and how many to
-    // take of each. Until it is whole it is with the parts. `check` is called for every frame; what
-    // it throws ends the writing.
+    // Writes a video of the compressed frames of its parts, and how many to take of each. `check`
+    // is called for every frame; what it throws ends the writing.
     virtual void join(const std::vector<std::pair<std::filesystem::path, int>>& parts,
-                      const std::filesystem::path& target, double rate,
-                      const std::function<void()>& check) = 0;
+                      const std::filesystem::path& file, const std::filesystem::path& target,
+                      double rate, const std::function<void()>& check) = 0;
 };
 
 // -- Sinks ----------------------------------------------------------------------------------------
@@ -94,8 +92,32 @@ std::filesystem::path journal_of(const std::filesystem::path& output);
 // float32 or 16-bit colour, nor odd sizes.
 void check_video_image(const std::filesystem::path& target, const ImageView& image);
 
-// Frames that a run that is killed, not only interrupted, can lose of a video at most.
+// Frames that a run that is killed, not only interrupted, can lose of a video at most, and of a
+// folder: so many go to the disk together.
 inline constexpr int kPartFrames = 250;
+inline constexpr int kBatchFrames = 32;
+
+// The files of an output, of frames of these names: those that a run may write to.
+std::vector<std::filesystem::path> output_files(const std::filesystem::path& output,
+                                                const std::vector<FrameName>& frames,
+                                                bool overlays);
+// The folders that are filled with images; none of a video.
+std::vector<std::filesystem::path> output_folders(const std::filesystem::path& output,
+                                                  bool overlays);
+
+// Throws InputError where one of these files is there though the journal of the output is new:
+// others have made it.
+void check_not_others(const std::filesystem::path& output,
+                      const std::vector<std::filesystem::path>& files);
+// Throws InputError where another video's run has a file beside it that this one's has too: o.mp4
+// and o.avi both have o.masks.mkv.
+void check_alone(const std::filesystem::path& output);
+
+// Makes a video of the parts that a live run has left, which was killed or could not end; returns
+// how many frames it has. `check` is called for every frame, and may throw. Throws InputError where
+// there is no such run.
+int join_parts(const std::filesystem::path& output, Codecs& codecs,
+               const std::function<void()>& check);
 
 // A video where the suffix says so, at `rate` frames a second, in parts of `part_frames`; else a
 // folder: images under the names of the frames, masks/ and overlays/ beside them. `journal`: may be

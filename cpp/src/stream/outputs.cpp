@@ -1,0 +1,166 @@
+#include "xcalib/stream/outputs.hpp"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <map>
+#include <set>
+#include <system_error>
+
+#include "base/whole_file.hpp"
+#include "xcalib/error.hpp"
+#include "xcalib/stream/files.hpp"
+#include "xcalib/stream/sink.hpp"
+
+namespace xcalib {
+namespace {
+
+namespace fs = std::filesystem;
+using Path = fs::path;
+
+// What a file is, whatever it is called.
+using Identity = std::pair<dev_t, ino_t>;
+
+// None where there is no such file.
+std::optional<Identity> identity_of(const Path& path) {
+    struct stat about {};
+    if (stat(path.empty() ? "." : path.c_str(), &about) != 0) return std::nullopt;
+    return Identity{about.st_dev, about.st_ino};
+}
+
+// Names that are no folder's: someone who gives one expects a file.
+bool is_called_like_a_file(const Path& output) {
+    static const std::set<std::string> kSuffixes = {
+        ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".npy",  ".exr", ".m4v",
+        ".mov", ".mpg", ".mpeg", ".ts",  ".webm", ".wmv", ".yaml", ".yml", ".json"};
+    return output.has_filename() && kSuffixes.count(lower_suffix(output));
+}
+
+// Images and depth maps: what a folder may be given for.
+bool is_image(const Path& file) {
+    static const std::set<std::string> kSuffixes = {".png",  ".jpg", ".jpeg", ".tif",
+                                                    ".tiff", ".bmp", ".npy",  ".exr"};
+    return kSuffixes.count(lower_suffix(file)) > 0;
+}
+
+Path folder_of(const Path& file) { return file.has_parent_path() ? file.parent_path() : "."; }
+
+[[noreturn]] void refuse_folder(const Path& folder) {
+    throw InputError("output folder " + folder.string() + " is an input folder, expected another");
+}
+
+}  // namespace
+
+void check_folder_writable(const Path& folder) {
+    if (folder.empty())
+        throw InputError("cannot write to '': the name is empty, expected a folder name");
+    Path base = fs::absolute(folder).lexically_normal();
+    while (!fs::exists(base) && base.has_parent_path() && base != base.parent_path())
+        base = base.parent_path();
+    const std::string cannot = "cannot write to " + folder.string() + ": " + base.string();
+    if (!fs::is_directory(base)) throw InputError(cannot + " is a file, expected a folder");
+    // Only an attempt shows it: access rights say nothing of read-only and special file systems.
+    try {
+        const WholeFile attempt(base / "xcalib");
+    } catch (const std::system_error& error) {
+        throw InputError(cannot + ": " + error.code().message());
+    }
+}
+
+void check_file_writable(const Path& file) {
+    check_name(file);
+    const Destination to(file);
+    if (fs::is_directory(to.file))
+        throw InputError("cannot write to " + file.string() +
+                         ": it is a folder, expected a file name");
+    if (!to.direct) check_folder_writable(folder_of(to.file));
+}
+
+void check_output_writable(const Path& output) {
+    check_name(output);
+    if (is_video_output(output)) {
+        check_file_writable(output);
+        std::error_code none;
+        const bool link = fs::is_symlink(output, none);
+        if (link || Destination(output).direct)
+            throw InputError("cannot write to " + output.string() + ": it is a " +
+                             (link ? "link" : "pipe or a device") +
+                             ", expected a video file or a folder");
+        return;
+    }
+    if (is_called_like_a_file(output) && !fs::is_directory(output))
+        throw InputError("cannot write to " + output.string() +
+                         ": a video is .mp4, .avi or .mkv, a folder has another name; expected"
+                         " one of these");
+    check_folder_writable(output);
+}
+
+void check_apart(const std::vector<Path>& reads, const Writes& writes) {
+    std::map<Identity, Path> read;
+    std::set<Identity> image_folders;
+    const auto add = [&](const Path& file) {
+        if (const auto identity = identity_of(file)) read.emplace(*identity, file);
+        if (!is_image(file)) return;
+        if (const auto identity = identity_of(folder_of(file))) image_folders.insert(*identity);
+    };
+    for (const Path& path : reads) {
+        std::error_code none;
+        if (!path.empty()) add(path);
+        for (const fs::directory_entry& entry : fs::directory_iterator(path, none))
+            if (entry.is_regular_file(none)) add(entry.path());
+    }
+    for (const Path& folder : writes.folders) {
+        const auto identity = identity_of(folder);
+        if (identity && (image_folders.count(*identity) || read.count(*identity)))
+            refuse_folder(folder);
+    }
+    std::map<Identity, Path> written;
+    std::set<Path> names;
+    std::map<Path, Path> folders;  // that links lead to
+    const auto is_named_twice = [&](const Path& file) {
+        Path& folder = folders[folder_of(file)];
+        if (folder.empty()) folder = fs::weakly_canonical(folder_of(file));
+        return !names.insert(folder / file.filename()).second;
+    };
+    for (const Path& file : writes.files) {
+        const auto identity = identity_of(file);
+        if (identity && read.count(*identity)) {
+            const Path& input = read[*identity];
+            throw InputError(file.string() + " would be overwritten, but is an input" +
+                             (input == file ? "" : " (" + input.string() + ")") +
+                             "; expected another output");
+        }
+        // Two that do not exist yet are distinguished by their names.
+        const bool twice =
+            identity ? !written.emplace(*identity, file).second : is_named_twice(file);
+        struct stat about {};
+        if (twice && !(stat(file.c_str(), &about) == 0 && S_ISCHR(about.st_mode)))
+            throw InputError(file.string() + " would be written twice, expected another name");
+    }
+}
+
+std::vector<Path> files_of(const Frames& frames) {
+    std::set<Path> files;
+    for (int index = 0; index < frames.size(); ++index) {
+        files.insert(frames.references->file(index));
+        files.insert(frames.sources->file(index));
+        for (const Path& file : frames.depth->files(index)) files.insert(file);
+    }
+    // Tables of times are read from the folders of images.
+    std::set<Path> folders;
+    for (const Path& file : files) folders.insert(folder_of(file));
+    for (const Path& folder : folders)
+        for (const char* table : {"timestamps.csv", "timestamps.txt"}) files.insert(folder / table);
+    return {files.begin(), files.end()};
+}
+
+void check_writes(const std::vector<Path>& files, const Frames& frames,
+                  std::vector<Path> other_reads) {
+    for (const Path& file : files) check_file_writable(file);
+    const std::vector<Path> reads = files_of(frames);
+    other_reads.insert(other_reads.end(), reads.begin(), reads.end());
+    check_apart(other_reads, {files, {}});
+}
+
+}  // namespace xcalib

@@ -1,0 +1,64 @@
+"""Lenses of the source in a calibration: k1 estimated where there is one, and one that is given."""
+
+import numpy as np
+import pytest
+
+import xcalib
+from xcalib import synthetic
+
+NONE = xcalib.Lens("none", [])
+
+
+def rig_with(lens: xcalib.Lens) -> xcalib.Rig:
+    return synthetic.random_rig(
+        seed=200,
+        max_offset=0.1,
+        hfov_deg=(40, 65),
+        fov_ratio=(0.7, 1.4),
+        max_baseline=0.2,
+        width=320,
+        height=240,
+        source_width=320,
+        source_height=256,
+        source_lens=lens,
+    )
+
+
+def calibrated(rig: xcalib.Rig, lens: xcalib.Lens | None) -> tuple[xcalib.CalibrationResult, float]:
+    """With this lens given, and the 95 % error of the mapping [px of the source]."""
+    street = synthetic.Street(rig, num_frames=10, seed=200, speed=6.0)
+    frames = [street.frame(i) for i in range(10)]
+    options = xcalib.CalibrationOptions()
+    options.source_lens = lens
+    result = xcalib.calibrate(
+        [frame.reference for frame in frames],
+        [frame.source for frame in frames],
+        [frame.depth for frame in frames],
+        options=options,
+    )
+    maps = [xcalib.Registrar(r).map(frames[5].depth) for r in (result.rig, rig)]
+    return result, float(np.nanpercentile(np.linalg.norm(maps[0] - maps[1], axis=-1), 95))
+
+
+@pytest.mark.parametrize("k1", [0.0, -0.3])
+def test_a_lens_is_found_where_there_is_one(k1: float) -> None:
+    result, error = calibrated(rig_with(xcalib.Lens("brown", [k1, 0, 0, 0]) if k1 else NONE), None)
+    assert result.report.lens.tried
+    assert (result.report.lens.coefficients > 0) == (k1 != 0)
+    assert error < 0.5
+
+
+def test_none_is_looked_for_where_none_is_said_to_be() -> None:
+    result, error = calibrated(rig_with(xcalib.Lens("brown", [-0.3, 0, 0, 0])), NONE)
+    assert not result.report.lens.tried
+    assert result.rig.source.lens.model == "none"
+    assert error > 0.5
+
+
+def test_a_lens_that_is_given_stays_and_the_focal_length_goes_with_it() -> None:
+    lens = xcalib.Lens("brown", [-0.3, 0, 0, 0])
+    result, error = calibrated(rig_with(lens), lens)
+    assert not result.report.lens.tried
+    assert result.rig.source.lens == lens
+    assert result.rig.reference.fx == pytest.approx(result.rig.reference.fy)
+    assert error < 0.5
