@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "xcalib/camera.hpp"
 #include "xcalib/export.hpp"
@@ -49,6 +50,17 @@ struct SearchOptions {
     int candidates = 12;         // peaks considered, >= 1
 };
 
+// The expected error up to which a calibration is trusted, over the footage's own depths [px of the
+// reference when its width is 640 px].
+struct Tolerance {
+    double median = 2.0;  // > 0
+    double p95 = 5.0;     // > 0
+
+    // "2,5" as an option gives it, or "2": 95 % within 2.5 times the median. Throws InputError that
+    // names the option.
+    static Tolerance parse(const std::string& option, const std::string& text);
+};
+
 struct CalibrationOptions {
     int max_frames = 32;        // pairs used, spread over the footage, >= 1
     std::uint32_t seed = 0;     // of the frame choice
@@ -82,6 +94,7 @@ struct CalibrationOptions {
     // for.
     std::optional<Mount> mount;
     SearchOptions search;
+    Tolerance tolerance;
     Solver solver = Solver::ceres;
     AdamOptions adam;
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 
 #include "base/parallel.hpp"
 #include "solve/solve.hpp"
@@ -23,13 +22,6 @@ Pinhole camera_guess(const ImageView& image, double hfov) {
 Pinhole with_lens(Pinhole camera, const std::optional<Lens>& lens) {
     if (lens) camera.lens = *lens;
     return camera;
-}
-
-// What candidates are compared by: how well edges agree beyond chance, and over how much of the
-// image. Chance grows as the overlap shrinks. `value`: a NecValue or a LevelReport.
-template <class Value>
-double merit(const Value& value) {
-    return value.aligned * std::sqrt(value.valid_share);
 }
 
 // Where the field of view of the reference makes little difference, it is the paper's 45 deg.
@@ -302,9 +294,9 @@ Rig given_start(const ImageView& reference, const ImageView& source,
 Start find_start(const WorkingImages& all_images, const ImageView& reference,
                  const ImageView& source, const std::optional<Rig>& initial, const Plan& plan,
                  const std::function<void(double)>& progress) {
-    constexpr std::size_t kFrames = 8, kFew = 6;
+    constexpr std::size_t kFew = 6;
     const CalibrationOptions& options = plan.options;
-    const WorkingImages images = all_images.spread(kFrames);
+    const WorkingImages images = all_images.spread(kStartFrames);
     const int num_threads = options.num_threads;
     const double start = seconds_now();
     Start out;
@@ -319,7 +311,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         found = {given};
     }
     if (found.empty())
-        throw std::runtime_error("the search found no displacement at which the images overlap");
+        throw NothingFound("the search found no displacement at which the images overlap");
     out.search_seconds = seconds_now() - start;
     progress(0.4);
 

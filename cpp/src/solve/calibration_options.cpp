@@ -1,8 +1,12 @@
 #include "xcalib/calibration_options.hpp"
 
 #include <cmath>
+#include <locale>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
+
+#include "xcalib/error.hpp"
 
 #include "xcalib/threads.hpp"
 
@@ -17,6 +21,22 @@ void require(bool ok, const char* field, double value, const char* expected) {
 }
 
 }  // namespace
+
+Tolerance Tolerance::parse(const std::string& option, const std::string& text) {
+    constexpr double kWider = 2.5;
+    std::vector<double> values;
+    std::istringstream parts(text + ",");
+    parts.imbue(std::locale::classic());
+    double value = 0;
+    char comma = 0;
+    while (parts >> value >> comma && comma == ',' && value > 0) values.push_back(value);
+    parts.clear();
+    const bool whole = parts.peek() == std::istringstream::traits_type::eof();
+    if (!whole || values.empty() || values.size() > 2)
+        throw InputError(option + " is '" + text +
+                         "', expected MEDIAN or MEDIAN,P95: pixels above 0, as 2,5");
+    return {values[0], values.size() > 1 ? values[1] : kWider * values[0]};
+}
 
 void CalibrationOptions::validate() const {
     require(max_frames >= 1, "max_frames", max_frames, "at least 1");
@@ -44,6 +64,8 @@ void CalibrationOptions::validate() const {
             search.min_overlap, "a share in (0, 1)");
     require(search.map_width >= 32, "search.map_width", search.map_width, "at least 32 px");
     require(search.candidates >= 1, "search.candidates", search.candidates, "at least 1");
+    require(tolerance.median > 0, "tolerance.median", tolerance.median, "more than 0 px");
+    require(tolerance.p95 > 0, "tolerance.p95", tolerance.p95, "more than 0 px");
     if (relative_depth) relative_depth->validate("options: relative_depth");
     if (solver != Solver::adam) return;
     if (search.mode == SearchMode::full || search.mode == SearchMode::local)

@@ -14,6 +14,7 @@ from .._core import (
     CalibrationOptions,
     Lens,
     Pinhole,
+    Tolerance,
     _flow_arguments,
     left_out,
     report_document,
@@ -251,6 +252,14 @@ def frames_again(arguments: list[str], lag: int) -> Frames:
     help="Reference width that calibration works at [px].",
 )
 @click.option(
+    "--tolerance",
+    metavar="MEDIAN[,P95]",
+    default="2,5",
+    show_default=True,
+    help="Expected error up to which the rig is trusted, over the footage's own depths [px of the"
+    " reference at 640 px of width].",
+)
+@click.option(
     "--refine-plane",
     is_flag=True,
     help="With --depth plane: find the horizon and the roll from the footage (some 17 quick fits),"
@@ -286,6 +295,7 @@ def command(
     reference_hfov: float | None,
     optimize_reference: bool,
     working_width: int,
+    tolerance: str,
     refine_plane: bool,
     report_file: Path | None,
     quiet: bool,
@@ -324,6 +334,7 @@ def command(
     calibration.search.max_roll_deg = max_roll
     calibration.search.max_fov_ratio = max_fov_ratio
     calibration.mount = mount
+    calibration.tolerance = Tolerance.parse("--tolerance", tolerance)
     calibration.reference_lens = Lens.parse("--reference-lens", reference_lens)
     calibration.source_lens = Lens.parse("--source-lens", source_lens)
     calibration.solver = solver
