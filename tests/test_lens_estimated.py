@@ -70,3 +70,28 @@ def test_a_lens_that_is_given_stays_and_the_focal_length_goes_with_it() -> None:
     assert result.rig.source.lens == lens
     assert result.rig.reference.fx == pytest.approx(result.rig.reference.fy)
     assert error < 0.5
+
+
+def test_a_lens_moves_on_request() -> None:
+    rig, frames = footage(-0.3)
+    images = [[getattr(f, name) for f in frames] for name in ("reference", "source", "depth")]
+    options = xcalib.CalibrationOptions(optimize_lens=True)
+    options.source_lens = xcalib.Lens("brown", [-0.1, 0, 0, 0])
+    found = xcalib.calibrate(*images, options=options).rig.source.lens
+    assert found.coefficients[0] == pytest.approx(-0.3, abs=0.1)
+    assert found.coefficients[1] != 0
+    options.solver = "adam"
+    by_adam = xcalib.calibrate(*images, initial=rig, options=options)
+    assert by_adam.report.lens.coefficients == 2
+    assert by_adam.rig.source.lens.coefficients[0] < -0.15
+
+
+def test_lenses_that_cannot_move_are_refused() -> None:
+    options = xcalib.CalibrationOptions(optimize_lens=True)
+    options.source_lens = xcalib.Lens("fisheye", [0, 0, 0, 0])
+    with pytest.raises(ValueError, match="optimize_lens with source_lens = fisheye:0,0,0,0"):
+        options.validate()
+    options.source_lens = None
+    options.source_camera = rig_with(NONE).source
+    with pytest.raises(ValueError, match="optimize_lens beside source_camera"):
+        options.validate()

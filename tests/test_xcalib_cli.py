@@ -59,7 +59,7 @@ def assert_same_pixels(first: Path, second: Path, count: int = FRAMES) -> None:
         ("--frames", 3, "--seed", 2, "--explain"),
         ("--choose", "spread", "--frames", 3, "--seed", 5),
         ("--search", "off", "--flow", "patch", "--reference-hfov", 50),
-        ("--solver", "adam", "--frames", 2),
+        ("--solver", "adam", "--frames", 2, "--optimize-lens"),
         ("--source-intrinsics", "277,278,105,85.5", "--optimize-reference"),
         ("--depth-steady", "--choose", "spread"),
         (
@@ -371,6 +371,10 @@ def test_bench_times_frames(cli: Callable[..., Process], rendered: Path) -> None
         (
             *("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r"),
             *("--reference-intrinsics", "1,1,0,0", "--optimize-reference"),
+        ),
+        (
+            *("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r"),
+            *("--optimize-lens", "--source-lens", "fisheye:0.1,0,0,0"),
         ),
         (
             *("calibrate", "visible", "thermal", "--depth", "depth", "-o", "r"),

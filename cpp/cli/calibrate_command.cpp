@@ -369,6 +369,10 @@ void add_calibrate(CLI::App& app, Console& console) {
         ->type_name("DEG");
     command->add_flag("--optimize-reference", a.options.optimize_reference,
                       "Estimate the reference intrinsics too.  [default: kept]");
+    command->add_flag("--optimize-lens", a.options.optimize_lens,
+                      "Estimate k1 and k2 of the source's lens, from --source-lens where given, and"
+                      " keep them whether or not unseen frames gain; with --solver adam too."
+                      "  [default: kept where they gain]");
     command
         ->add_option("--working-width", a.options.working_width,
                      "Reference width that calibration works at [px].")

@@ -68,12 +68,17 @@ void bind_cameras(py::class_<CalibrationOptions>& options) {
                        "of the initial rig, or none.")
         .def_readwrite("source_lens", &CalibrationOptions::source_lens,
                        "Lens of the source's images, frozen. None: that of source_camera or of "
-                       "the initial rig, or none.")
+                       "the initial rig; else k1 and k2 are estimated and kept where unseen frames "
+                       "gain.")
         .def_readwrite("reference_hfov_deg", &CalibrationOptions::reference_hfov_deg,
                        "Horizontal field of view to assume [deg], or None to search it.")
         .def_readwrite("optimize_reference", &CalibrationOptions::optimize_reference,
                        "Free the reference's intrinsics too; they are coupled with the source's. "
                        "The solver 'adam' always does.")
+        .def_readwrite("optimize_lens", &CalibrationOptions::optimize_lens,
+                       "Free k1 and k2 of the source's lens, from source_lens where it is given, "
+                       "and keep them whether or not unseen frames gain; the solver 'adam' has a "
+                       "lens so only.")
         .def_readwrite("relative_depth", &CalibrationOptions::relative_depth,
                        "RelativeDepth that the depth maps were made with: the shift is estimated, "
                        "the scale kept, and the rig has both. None: metric depth.");

@@ -313,6 +313,8 @@ class CalibrationOptions:
     """Free the reference's intrinsics too; they are coupled with the source's. The solver 'adam'
     always does.
     """
+    optimize_lens: bool
+    """x"""
     relative_depth: RelativeDepth | None
     """RelativeDepth that the depth maps were made with: the shift is estimated, the scale kept,
     and the rig has both. None: metric depth.

@@ -85,6 +85,9 @@ struct CalibrationOptions {
     // The reference's intrinsics and the source's are coupled (a gauge): free only on request, save
     // with Solver::adam, which frees them as published.
     bool optimize_reference = false;
+    // k1 and k2 of the source's lens move with everything else, from those of `source_lens` where
+    // it is given, and are kept whether or not unseen frames gain by them; with Solver::adam too.
+    bool optimize_lens = false;
 
     // The depth maps are 1 / (scale r + shift) of relative inverse depth: the shift is estimated,
     // the scale stays as the gauge of the translation, and the rig has both. None: metric.

@@ -222,7 +222,8 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     };
     Plan plan(options, flow, parts);
     if (initial) plan.fits_gauge = false;  // it is known, as is a lens that it has
-    if (initial && initial->source.lens.bends()) plan.estimates_lens = false;
+    if (initial && initial->source.lens.bends() && !options.optimize_lens)
+        plan.estimates_lens = false;
     validate(references, sources, depths, initial, options);
 
     const WorkersOfThread workers(resolve_threads(options.num_threads));
@@ -246,6 +247,8 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
         solve_adam(
             *attempt.images, attempt.plan,
             [&](double share) { notify("refine", 0.05 + 0.9 * share); }, result.rig, result.report);
+        result.report.lens.tried = options.optimize_lens;
+        result.report.lens.coefficients = attempt.plan.lens_coefficients;
         settle_refit(attempt, make_level(*attempt.images, 1, result.rig, options.num_threads),
                      result);
     } else {

@@ -182,7 +182,6 @@ Rig with_k1(const Rig& rig, double k1) {
 
 // A pinhole hardly finds what a strong lens shows: a few are tried.
 void try_lenses(const Level& level, const Plan& plan, Candidate& candidate) {
-    if (!plan.estimates_lens) return;
     constexpr double kStep = -0.1, kCost = 0.1;
     constexpr int kCount = 5;
     const Rig from = candidate.rig;
@@ -319,6 +318,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         schedule(images.references[0].width, images.references[0].height, plan.parts);
     const int placing =
         schedule(images.references[0].width, images.references[0].height, {})[0].factor;
+    const bool lens_free = plan.searches && plan.estimates_lens && !options.source_lens &&
+                           !(initial && initial->source.lens.bends());
     const bool focal_free = !initial && !options.reference_camera && !options.reference_hfov_deg &&
                             !options.source_camera;
     // Placing costs hundreds of evaluations: fewer frames are enough.
@@ -362,7 +363,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
             keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
-            if (plan.searches && steps[s].factor >= kCoarse && steps[s].stage == 2)
+            if (lens_free && steps[s].factor >= kCoarse && steps[s].stage == 2)
                 try_lenses(level, plan, candidate);
             candidate.levels.push_back(
                 plan.searches && plan.parts.images

@@ -8,6 +8,7 @@
 
 #include "xcalib/error.hpp"
 
+#include "xcalib/parameters.hpp"
 #include "xcalib/threads.hpp"
 
 namespace xcalib {
@@ -56,6 +57,13 @@ void CalibrationOptions::validate() const {
     if (source_camera) source_camera->validate("options: source_camera");
     if (reference_lens) reference_lens->validate("options: reference_lens");
     if (source_lens) source_lens->validate("options: source_lens");
+    if (optimize_lens && source_camera)
+        throw std::invalid_argument(
+            "options: optimize_lens beside source_camera, which is kept, expected one of them");
+    if (optimize_lens && source_lens && !has_lens_parameters(*source_lens))
+        throw std::invalid_argument("options: optimize_lens with source_lens = " +
+                                    Lens::word(source_lens) +
+                                    ", expected brown of 4 or 5 coefficients, or none given");
     require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
             search.max_fov_ratio, "a ratio in (1, 10]");
     require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",

@@ -244,6 +244,13 @@ def frames_again(arguments: list[str], lag: int) -> Frames:
     help="Estimate the reference intrinsics too.  [default: kept]",
 )
 @click.option(
+    "--optimize-lens",
+    is_flag=True,
+    default=DEFAULTS.optimize_lens,
+    help="Estimate k1 and k2 of the source's lens, from --source-lens where given, and keep them"
+    " whether or not unseen frames gain; with --solver adam too.  [default: kept where they gain]",
+)
+@click.option(
     "--working-width",
     metavar="PX",
     type=COUNT,
@@ -294,6 +301,7 @@ def command(
     source_lens: str,
     reference_hfov: float | None,
     optimize_reference: bool,
+    optimize_lens: bool,
     working_width: int,
     tolerance: str,
     refine_plane: bool,
@@ -329,6 +337,7 @@ def command(
         working_width=working_width,
         reference_hfov_deg=reference_hfov,
         optimize_reference=optimize_reference,
+        optimize_lens=optimize_lens,
     )
     calibration.search.mode = search
     calibration.search.max_roll_deg = max_roll
