@@ -34,4 +34,22 @@ inline std::size_t cells_with_room(const CellGrid& grid) {
     return static_cast<std::size_t>(grid.count()) + grid.width + 64;
 }
 
+// Cells along a row of the reference. Where epipolar lines run nearly along its rows, a pixel is
+// hidden by others of its own row or, as good as always, not at all, and a row of cells does for
+// what takes a grid of them elsewhere.
+struct RowGrid {
+    // A vector of cells written around a place must not leave the row.
+    static constexpr int kBefore = 64, kBehind = 128;
+
+    bool serves = false;             // is that so?
+    bool along_u = true;             // along a row, u of the source changes; else v
+    float per_pixel = 1, shift = 0;  // to cells, so that places grow along the row
+    int count = 0;
+    bool near_lies_back = true;  // near points lie where farther ones before them do
+
+    RowGrid() = default;
+    explicit RowGrid(const Rig& rig);
+    int room() const { return count + kBehind; }
+};
+
 }  // namespace xcalib

@@ -127,6 +127,22 @@ struct DepthRow {
     }
 };
 
+#if HWY_TARGET != HWY_SCALAR
+// What is nearest in the cells of a window of 2 kLanes and in those so many behind, at `index`: the
+// upper half of a float.
+HWY_INLINE Int nearest_in_window(const Nearness* from, int step, Int index) {
+    const IntTag di;
+    const hn::Repartition<Nearness, IntTag> pairs;
+    const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + step));
+    const Int both = hn::TableLookupLanes(
+        hn::BitCast(di, nearest),
+        hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
+    return hn::IfThenElse(hn::TestBit(index, set(1)),
+                          hn::And(both, set(static_cast<int>(0xffff0000))),
+                          hn::ShiftLeft<16>(both));
+}
+#endif
+
 // The cell of points within the source, or on its rim.
 HWY_INLINE Int cells_of(const CellGrid& grid, Float x, Float y) {
     const Float width = set(static_cast<double>(grid.width));

@@ -80,12 +80,14 @@ struct Registrar::Stream {
         std::vector<Nearness> cells;
         DepthRows depth;
         std::vector<DepthRows::Room> rooms;  // one a thread
+        std::vector<HiddenRoom> hidden;      // also one a thread
     };
 
     Rig rig;
     RegistrarOptions options;
     Projector projector;
     CellGrid grid;
+    RowGrid row_grid;
     int threads;
     int parts;
     bool occlusion;
@@ -94,7 +96,7 @@ struct Registrar::Stream {
     std::vector<std::unique_ptr<Scratch>> spare;
 
     Stream(const Rig& for_rig, const RegistrarOptions& with)
-        : rig(for_rig), options(with), projector(rig), grid(rig),
+        : rig(for_rig), options(with), projector(rig), grid(rig), row_grid(rig),
           threads(resolve_threads(options.num_threads)), parts(std::min(threads, kMaxParts)),
           // Cameras at one place see the same.
           occlusion(options.occlusion != Occlusion::ignore && rig.t().norm() > 0),
@@ -112,8 +114,12 @@ struct Registrar::Stream {
             }
         }
         auto scratch = std::make_unique<Scratch>();
-        if (occlusion) scratch->cells.resize((parts + 1) * cells_with_room(grid));
         scratch->rooms.resize(threads);
+        scratch->hidden.resize(threads);
+        if (!occlusion) return scratch;
+        if (!row_grid.serves) scratch->cells.resize((parts + 1) * cells_with_room(grid));
+        else
+            for (HiddenRoom& room : scratch->hidden) room.keep(rig.reference.width, row_grid);
         return scratch;
     }
 
@@ -132,9 +138,9 @@ struct Registrar::Stream {
         });
     }
 
-    // Splats all of the depth, then calls work(task, begin, end) on all rows of the reference, with
-    // what is the same for all of them in `task`. Its cells are null where nothing can be hidden,
-    // or nobody asks.
+    // Calls work(task, begin, end) on all rows of the reference, with what is the same for all of
+    // them in `task`: the means to tell what is hidden too, where something can be, and it is
+    // `asked` for. If these are a grid of cells, all of the depth is splat first.
     template <class Work>
     void each_row(RowsTask task, const DepthView& depth, bool asked, const Work& work) {
         const int height = rig.reference.height;
@@ -142,7 +148,8 @@ struct Registrar::Stream {
         DepthRows& rows = scratch->depth;
         rows.set(depth, rig.reference.width, height);
         for (DepthRows::Room& room : scratch->rooms) rows.prepare(room);
-        if (occlusion && asked) {
+        if (occlusion && asked && row_grid.serves) task.row_grid = &row_grid;
+        else if (occlusion && asked) {
             Nearness* cells = scratch->cells.data();
             const std::size_t size = cells_with_room(grid);
             workers.each(parts,
@@ -163,6 +170,7 @@ struct Registrar::Stream {
         share_out(threads, height, [&](int part, int begin, int end) {
             RowsTask of_thread = task;
             of_thread.room = &scratch->rooms[part];
+            of_thread.hidden = &scratch->hidden[part];
             work(of_thread, begin, end);
         });
         give_back(std::move(scratch));

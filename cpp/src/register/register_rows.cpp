@@ -18,20 +18,48 @@ namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
 
+// Where the pixels of a row lie that is looked at a vector at a time.
+struct SlowRow {
+    const RowsTask& task;
+    const AnyRow& row;
+    const DepthRow& depths;
+    const HiddenRow& hidden;
+
+    HWY_INLINE Float depth(int x) const { return depths.load(x, task.depth->width() - x); }
+    HWY_INLINE static Float along(int x) {
+        return hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
+    }
+    HWY_INLINE Located locate(int x) const {
+        return HWY_NAMESPACE::locate(row, depth(x), along(x), x);
+    }
+    // Of valid ones those that something hides.
+    HWY_INLINE Mask gone(int x, const Points& p, Mask valid) const {
+        if (task.cells) return hn::And(valid, HWY_NAMESPACE::hidden(*task.grid, task.cells, p));
+        if (hidden.may_be_hidden(x)) return hn::And(valid, hidden.hidden(x));
+        return hn::MaskFromVec(hn::Zero(FloatTag()));
+    }
+};
+
+// Puts the pixels from x on.
+HWY_INLINE void put(const SlowRow& row, HiddenRow& hidden, int x) {
+    const Points p = row.locate(x).points();
+    hidden.put(x, p, in_front(row.depth(x), p), row.along(x));
+}
+
 // Any vector of pixels.
 template <class T, int kChannels>
-HWY_INLINE void sample(const RowsTask& task, const Source& source, const AnyRow& row, Float depth,
-                       Float x, int column, T* out, std::uint8_t* mask) {
+HWY_INLINE void sample(const SlowRow& row, const Source& source, int x, T* out,
+                       std::uint8_t* mask) {
     const IntTag di;
-    const Located at = locate(row, depth, x, column);
+    const RowsTask& task = row.task;
+    const Float depth = row.depth(x);
+    const Located at = row.locate(x);
     Points p = at.points();
     Mask valid = confine(*task.projector, depth, p);
     Int codes = codes_of(depth, valid);
-    if (task.cells) {
-        const Mask gone = hn::And(valid, hidden(*task.grid, task.cells, p));
-        codes = hn::IfThenElse(hn::RebindMask(di, gone), code_of(Validity::occluded), codes);
-        if (task.hide) valid = hn::AndNot(gone, valid);
-    }
+    const Mask gone = row.gone(x, p, valid);
+    codes = hn::IfThenElse(hn::RebindMask(di, gone), code_of(Validity::occluded), codes);
+    if (task.hide) valid = hn::AndNot(gone, valid);
     store_codes(codes, mask);
     if (hn::AllFalse(FloatTag(), valid)) std::fill_n(out, kLanes * kChannels, T{0});
     else if (task.nearest) sample_nearest<T, kChannels>(source, p, valid, out);
@@ -44,43 +72,37 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
     const Source source(task.source);
     T pixels[kLanes * kChannels];  // of the last, incomplete vector of a row
     std::uint8_t codes[kLanes];
-#if HWY_TARGET != HWY_SCALAR
-    Stretch stretch;
-#endif
     for (int y = begin; y < end; ++y) {
-#if HWY_TARGET != HWY_SCALAR
-        const Reach reach = reach_of<T>(source, task.projector->step_along_row(width / 2, y));
-#endif
         const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(*task.depth, y, *task.room);
+        HiddenRow hidden(task, width);
+        const SlowRow slow{task, row, depth, hidden};
         T* out = reinterpret_cast<T*>(static_cast<char*>(task.registered.data) +
                                       y * task.registered.row_bytes);
         std::uint8_t* mask = task.mask + static_cast<std::size_t>(y) * width;
         const auto sample_at = [&](int x) HWY_ATTR {
-            const Float along = hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
             const int left = width - x;
             if (left >= kLanes) {
-                sample<T, kChannels>(task, source, row, depth.load(x), along, x,
-                                     out + kChannels * x, mask + x);
+                sample<T, kChannels>(slow, source, x, out + kChannels * x, mask + x);
                 return;
             }
-            sample<T, kChannels>(task, source, row, depth.load(x, left), along, x, pixels, codes);
+            sample<T, kChannels>(slow, source, x, pixels, codes);
             std::copy_n(pixels, kChannels * left, out + kChannels * x);
             std::copy_n(codes, left, mask + x);
         };
-        int x = 0;
+        int whole = 0;  // up to here all is done by stretches
 #if HWY_TARGET != HWY_SCALAR
-        const RowPair rows(*task.projector, y);
-        while (!task.nearest && width - x >= kLanes) {
-            const int count = std::min(kVectors, (width - x) / kLanes);
-            Vectors left =
-                register_stretch<T, kChannels>(task, source, reach, rows, depth, y, x, count,
-                                               out + kChannels * x, mask + x, stretch);
-            for (; left; left &= left - 1) sample_at(x + kLanes * first_of(left));
-            x += count * kLanes;
-        }
+        if (!task.nearest) whole = width / kLanes * kLanes;
 #endif
-        for (; x < width; x += kLanes) sample_at(x);
+        if (task.row_grid)
+            for (int x = whole; x < width; x += kLanes) put(slow, hidden, x);
+#if HWY_TARGET != HWY_SCALAR
+        if (whole > 0)
+            register_usual(UsualRow<T, kChannels>(task, source, depth, y, out, mask), whole, hidden,
+                           sample_at);
+#endif
+        if (whole == 0 && task.row_grid) hidden.find();
+        for (int x = whole; x < width; x += kLanes) sample_at(x);
     }
 }
 
@@ -106,14 +128,17 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
         const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(*task.depth, y, *task.room);
         float* out = map + 2 * static_cast<std::size_t>(y) * width;
-        Float along = hn::Iota(d, 0.0f);
-        for (int x = 0; x < width; x += kLanes, along = hn::Add(along, set(double{kLanes}))) {
+        HiddenRow hidden(task, width);
+        const SlowRow slow{task, row, depth, hidden};
+        if (task.row_grid) {
+            for (int x = 0; x < width; x += kLanes) put(slow, hidden, x);
+            hidden.find();
+        }
+        for (int x = 0; x < width; x += kLanes) {
             HWY_ALIGN float u[kLanes], v[kLanes];
-            const Float metres = depth.load(x, width - x);
-            Points p = locate(row, metres, along, x).points();
-            Mask valid = confine(*task.projector, metres, p);
-            if (task.cells && task.hide)
-                valid = hn::AndNot(hidden(*task.grid, task.cells, p), valid);
+            Points p = slow.locate(x).points();
+            Mask valid = confine(*task.projector, slow.depth(x), p);
+            if (task.hide) valid = hn::AndNot(slow.gone(x, p, valid), valid);
             hn::Store(hn::IfThenElse(valid, p.u, none), d, u);
             hn::Store(hn::IfThenElse(valid, p.v, none), d, v);
             for (int i = 0; i < std::min(kLanes, width - x); ++i) {
@@ -122,6 +147,15 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
             }
         }
     }
+}
+
+int stretches_bytes(int width) {
+#if HWY_TARGET != HWY_SCALAR
+    return static_cast<int>(sizeof(Stretch)) * (width / (kVectors * kLanes) + 1);
+#else
+    (void)width;
+    return 0;
+#endif
 }
 
 }  // namespace
@@ -135,8 +169,20 @@ namespace {
 
 HWY_EXPORT(register_rows);
 HWY_EXPORT(map_rows);
+HWY_EXPORT(stretches_bytes);
 
 }  // namespace
+
+void HiddenRoom::keep(int width, const RowGrid& grid) {
+    constexpr int kRoom = 128;  // two vectors more, whatever their length
+    place.keep(width + kRoom);
+    inverse_z.keep(width + kRoom);
+    role.keep(width + kRoom);
+    breaks.keep(width + kRoom);
+    runs.keep(2 * width + kRoom);
+    cells.keep(grid.room());
+    stretches.keep(HWY_DYNAMIC_DISPATCH(stretches_bytes)(width));
+}
 
 void register_rows(const RowsTask& task, int begin, int end) {
     HWY_DYNAMIC_DISPATCH(register_rows)(task, begin, end);

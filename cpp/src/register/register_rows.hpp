@@ -20,14 +20,34 @@ void splat_rows(const Projector& projector, const DepthRows& depth, DepthRows::R
 void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begin, int end,
                 Nearness* out);
 
-// What all rows of a frame have in common. `cells` is null where occlusion is not looked for.
+// What a thread has of its own to find what is hidden in a row (hidden_row-inl.hpp).
+struct HiddenRoom {
+    // Vectors of pixels [first, last], and their lowest and highest place.
+    struct Run {
+        int first, last;
+        float low, high;
+    };
+    AlignedRow<float> place, inverse_z;  // by pixels
+    AlignedRow<std::uint8_t> role;       // by vectors
+    AlignedRow<std::int32_t> breaks;
+    AlignedRow<Run> runs;
+    AlignedRow<Nearness> cells;
+    AlignedRow<char> stretches;  // a row of what is located
+
+    void keep(int width, const RowGrid& grid);
+};
+
+// What all rows of a frame have in common. `cells` and `row_grid` are null where occlusion is not
+// looked for.
 struct RowsTask {
     const Projector* projector;
     const DepthRows* depth;
     DepthRows::Room* room;  // the thread's
     const CellGrid* grid;
     const Nearness* cells;
-    bool hide;  // occluded pixels are 0 in the image, and NaN in the map
+    const RowGrid* row_grid;  // null where the cells are, or nothing, looked at
+    HiddenRoom* hidden;       // the thread's
+    bool hide;                // occluded pixels are 0 in the image, and NaN in the map
     ImageView source;
     bool nearest;
     MutableImageView registered;
