@@ -128,13 +128,13 @@ struct Registrar::Stream {
         spare.push_back(std::move(scratch));
     }
 
-    // Calls work(part, begin, end) on all of so many rows, a thread a part.
+    // Calls work(part, begin, end) on all of so many rows, a thread a part, some at a time.
     template <class Work>
-    void share_out(int num_parts, int rows, const Work& work) {
+    void share_out(int num_parts, int rows, int at_a_time, const Work& work) {
         std::atomic<int> next{0};
         workers.each(num_parts, [&](int part) {
-            for (int y = next.fetch_add(kRows); y < rows; y = next.fetch_add(kRows))
-                work(part, y, std::min(rows, y + kRows));
+            for (int y = next.fetch_add(at_a_time); y < rows; y = next.fetch_add(at_a_time))
+                work(part, y, std::min(rows, y + at_a_time));
         });
     }
 
@@ -154,11 +154,11 @@ struct Registrar::Stream {
             const std::size_t size = cells_with_room(grid);
             workers.each(parts,
                          [&](int part) { std::fill_n(cells + part * size, size, Nearness{0}); });
-            share_out(parts, height, [&](int part, int begin, int end) {
+            share_out(parts, height, kRows, [&](int part, int begin, int end) {
                 splat_rows(projector, rows, scratch->rooms[part], grid, begin, end,
                            cells + part * size);
             });
-            share_out(threads, grid.height, [&](int, int begin, int end) {
+            share_out(threads, grid.height, kRows, [&](int, int begin, int end) {
                 join_cells(grid, cells, parts, begin, end, cells + parts * size);
             });
             task.cells = cells + parts * size;
@@ -167,7 +167,8 @@ struct Registrar::Stream {
         task.depth = &rows;
         task.grid = &grid;
         task.hide = options.occlusion == Occlusion::hide;
-        share_out(threads, height, [&](int part, int begin, int end) {
+        const int at_a_time = task.row_grid ? row_grid.rows_at_a_time() : kRows;
+        share_out(threads, height, at_a_time, [&](int part, int begin, int end) {
             RowsTask of_thread = task;
             of_thread.room = &scratch->rooms[part];
             of_thread.hidden = &scratch->hidden[part];

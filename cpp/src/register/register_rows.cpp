@@ -40,10 +40,26 @@ struct SlowRow {
     }
 };
 
-// Puts the pixels from x on.
+// The rows [begin, end) in the order in which shadows fall, after those that they fall from.
+struct RowOrder {
+    Shadows shadows;
+    int first, count, before;
+
+    HWY_INLINE RowOrder(const RowsTask& task, int begin, int end) : count(end - begin) {
+        if (task.row_grid) shadows = task.row_grid->shadows(begin, end);
+        first = shadows.down ? begin : end - 1;
+        const int most = shadows.down ? begin : task.depth->height() - end;
+        before = std::min(shadows.reach, most);
+    }
+    HWY_INLINE int row(int i) const { return shadows.down ? first + i : first - i; }
+};
+
+// Puts the pixels of a row from x on.
 HWY_INLINE void put(const SlowRow& row, HiddenRow& hidden, int x) {
-    const Points p = row.locate(x).points();
-    hidden.put(x, p, in_front(row.depth(x), p), row.along(x));
+    for (; x < row.task.depth->width(); x += kLanes) {
+        const Points p = row.locate(x).points();
+        hidden.put(x, p, in_front(row.depth(x), p), row.along(x));
+    }
 }
 
 // Any vector of pixels.
@@ -72,11 +88,18 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
     const Source source(task.source);
     T pixels[kLanes * kChannels];  // of the last, incomplete vector of a row
     std::uint8_t codes[kLanes];
-    for (int y = begin; y < end; ++y) {
+    const RowOrder order(task, begin, end);
+    for (int i = -order.before; i < order.count; ++i) {
+        const int y = order.row(i), nth = order.before + i;
         const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(*task.depth, y, *task.room);
-        HiddenRow hidden(task, width);
+        HiddenRow hidden(task, order.shadows, width);
         const SlowRow slow{task, row, depth, hidden};
+        if (i < 0) {
+            put(slow, hidden, 0);
+            hidden.find(nth);
+            continue;
+        }
         T* out = reinterpret_cast<T*>(static_cast<char*>(task.registered.data) +
                                       y * task.registered.row_bytes);
         std::uint8_t* mask = task.mask + static_cast<std::size_t>(y) * width;
@@ -94,14 +117,13 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
 #if HWY_TARGET != HWY_SCALAR
         if (!task.nearest) whole = width / kLanes * kLanes;
 #endif
-        if (task.row_grid)
-            for (int x = whole; x < width; x += kLanes) put(slow, hidden, x);
+        if (task.row_grid) put(slow, hidden, whole);
 #if HWY_TARGET != HWY_SCALAR
         if (whole > 0)
             register_usual(UsualRow<T, kChannels>(task, source, depth, y, out, mask), whole, hidden,
-                           sample_at);
+                           nth, sample_at);
 #endif
-        if (whole == 0 && task.row_grid) hidden.find();
+        if (whole == 0 && task.row_grid) hidden.find(nth);
         for (int x = whole; x < width; x += kLanes) sample_at(x);
     }
 }
@@ -124,16 +146,19 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
     const FloatTag d;
     const int width = task.depth->width();
     const Float none = set(std::numeric_limits<double>::quiet_NaN());
-    for (int y = begin; y < end; ++y) {
+    const RowOrder order(task, begin, end);
+    for (int i = -order.before; i < order.count; ++i) {
+        const int y = order.row(i);
         const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(*task.depth, y, *task.room);
         float* out = map + 2 * static_cast<std::size_t>(y) * width;
-        HiddenRow hidden(task, width);
+        HiddenRow hidden(task, order.shadows, width);
         const SlowRow slow{task, row, depth, hidden};
         if (task.row_grid) {
-            for (int x = 0; x < width; x += kLanes) put(slow, hidden, x);
-            hidden.find();
+            put(slow, hidden, 0);
+            hidden.find(order.before + i);
         }
+        if (i < 0) continue;
         for (int x = 0; x < width; x += kLanes) {
             HWY_ALIGN float u[kLanes], v[kLanes];
             Points p = slow.locate(x).points();
@@ -177,10 +202,11 @@ void HiddenRoom::keep(int width, const RowGrid& grid) {
     constexpr int kRoom = 128;  // two vectors more, whatever their length
     place.keep(width + kRoom);
     inverse_z.keep(width + kRoom);
-    role.keep(width + kRoom);
-    breaks.keep(width + kRoom);
-    runs.keep(2 * width + kRoom);
-    cells.keep(grid.room());
+    for (auto* row : {&low, &high}) row->keep(width + kRoom);
+    passed.keep(width + kRoom);
+    constexpr int rows = RowGrid::kMaxReach + 1;
+    limits.keep(rows * stride());
+    cells.keep(rows * grid.room());
     stretches.keep(HWY_DYNAMIC_DISPATCH(stretches_bytes)(width));
 }
 

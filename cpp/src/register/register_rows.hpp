@@ -22,19 +22,17 @@ void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begi
 
 // What a thread has of its own to find what is hidden in a row (hidden_row-inl.hpp).
 struct HiddenRoom {
-    // Vectors of pixels [first, last], and their lowest and highest place.
-    struct Run {
-        int first, last;
-        float low, high;
-    };
     AlignedRow<float> place, inverse_z;  // by pixels
-    AlignedRow<std::uint8_t> role;       // by vectors
-    AlignedRow<std::int32_t> breaks;
-    AlignedRow<Run> runs;
+    AlignedRow<float> low, high;         // by vectors, as what follows
+    AlignedRow<std::uint8_t> passed;
+    // Of this row and of those that came before it, as many as shadows reach.
+    AlignedRow<float> limits;
     AlignedRow<Nearness> cells;
+    float nearest[RowGrid::kMaxReach + 1] = {};
     AlignedRow<char> stretches;  // a row of what is located
 
     void keep(int width, const RowGrid& grid);
+    int stride() const { return low.size(); }
 };
 
 // What all rows of a frame have in common. `cells` and `row_grid` are null where occlusion is not

@@ -432,10 +432,11 @@ HWY_INLINE Vectors UsualRow<T, kChannels>::sample(int begin, int count, Stretch&
     return gather<T, kChannels, false>(source, others, stretch, to, codes);
 }
 
-// The whole vectors of a row, of which one(x) does those that are not usual.
+// The whole vectors of a row, of which one(x) does those that are not usual. The row is the
+// `count`th of those in which hidden pixels are looked for.
 template <class T, int kChannels, class One>
 HWY_INLINE void register_usual(const UsualRow<T, kChannels>& row, int whole, HiddenRow& hidden,
-                               const One& one) {
+                               int count, const One& one) {
     const RowsTask& task = row.task;
     const int vectors = whole / kLanes;
     const auto finish = [&](int begin, Vectors others) HWY_ATTR {
@@ -445,13 +446,12 @@ HWY_INLINE void register_usual(const UsualRow<T, kChannels>& row, int whole, Hid
         Stretch stretch;
         CellStretch cells;
         for (int i = 0; i < vectors; i += kVectors) {
-            const int begin = i * kLanes, count = std::min(kVectors, vectors - i);
+            const int begin = i * kLanes, n = std::min(kVectors, vectors - i);
+            if (task.cells) row.template locate<Hiding::grid>(begin, n, stretch, {&cells, nullptr});
+            else row.template locate<Hiding::none>(begin, n, stretch, {nullptr, nullptr});
+            const Vectors others = row.sample(begin, n, stretch);
             if (task.cells)
-                row.template locate<Hiding::grid>(begin, count, stretch, {&cells, nullptr});
-            else row.template locate<Hiding::none>(begin, count, stretch, {nullptr, nullptr});
-            const Vectors others = row.sample(begin, count, stretch);
-            if (task.cells)
-                mark_hidden<T, kChannels>(task, all_of(count) & ~others, count, cells,
+                mark_hidden<T, kChannels>(task, all_of(n) & ~others, n, cells,
                                           row.out + begin * kChannels, row.mask + begin);
             finish(begin, others);
         }
@@ -461,11 +461,11 @@ HWY_INLINE void register_usual(const UsualRow<T, kChannels>& row, int whole, Hid
     for (int i = 0; i < vectors; i += kVectors)
         row.template locate<Hiding::row>(i * kLanes, std::min(kVectors, vectors - i),
                                          stretches[i / kVectors], {nullptr, &hidden});
-    const bool any = hidden.find();
+    const bool any = hidden.find(count);
     for (int i = 0; i < vectors; i += kVectors) {
-        const int begin = i * kLanes, count = std::min(kVectors, vectors - i);
-        const Vectors others = row.sample(begin, count, stretches[i / kVectors]);
-        for (int k = 0; any && k < count; ++k) {
+        const int begin = i * kLanes, n = std::min(kVectors, vectors - i);
+        const Vectors others = row.sample(begin, n, stretches[i / kVectors]);
+        for (int k = 0; any && k < n; ++k) {
             const int x = begin + k * kLanes;
             if (hidden.may_be_hidden(x) && !((others >> k) & 1))
                 mark_vector<T, kChannels>(hidden.hidden(x), task.hide, row.out + x * kChannels,
