@@ -1,8 +1,9 @@
 // What hides pixels where epipolar lines run nearly along the rows of the reference. Along a row
-// the points of one surface lie one behind the other in the source; those that something nearer
-// hides are passed by what follows, in their own row or in one that a line comes from. Only their
-// vectors are compared with what was written to a row of cells for each row, in an order in which
-// the nearest comes last. Included once for each instruction set.
+// the points of one surface lie one behind the other in the source. Something nearer comes back
+// over those before it, which are passed by it; in the row where it is, or, as lines are not quite
+// along rows, in one of the next. Only such vectors are looked at: those that come back are written
+// to a row of cells, those that are passed are compared with it. Included once for each instruction
+// set.
 #if defined(XCALIB_HIDDEN_ROW_INL_) == defined(HWY_TARGET_TOGGLE)
 #ifdef XCALIB_HIDDEN_ROW_INL_
 #undef XCALIB_HIDDEN_ROW_INL_
@@ -33,44 +34,52 @@ constexpr double kRowSlack = 0.75;
 class HiddenRow {
    public:
     // Nothing may be called but may_be_hidden where the task has no row of cells. Rows come one
-    // after another, up or down as the shadows fall.
-    HWY_INLINE HiddenRow(const RowsTask& task, const Shadows& shadows, int width)
+    // after another, up or down as shadows fall; this is the one after `count` others.
+    HWY_INLINE HiddenRow(const RowsTask& task, const Shadows& shadows, int width, int count)
         : grid_(task.row_grid), tolerance_(task.grid), room_(task.hidden), shadows_(&shadows),
-          width_(width), vectors_((width + kLanes - 1) / kLanes) {}
+          width_(width), vectors_((width + kLanes - 1) / kLanes), count_(count) {
+        if (!grid_) return;
+        place_ = of_row(room_->place, 0);
+        inverse_z_ = of_row(room_->inverse_z, 0);
+    }
 
     // The points of the vector that begins at pixel x; `along` is the column of each.
     HWY_INLINE void put(int x, Float u_or_v, Float inverse_z, Mask somewhere, Float along) {
         const FloatTag d;
         const Float at = hn::MulAdd(u_or_v, hn::Set(d, grid_->per_pixel), hn::Set(d, grid_->shift));
         const Float held = hn::Min(hn::Max(at, set(-kFarthestPlace)), set(kFarthestPlace));
-        hn::Store(hn::IfThenElse(somewhere, held, hn::Add(along, set(kNoPlace))), d,
-                  room_->place.data() + x);
-        hn::Store(inverse_z, d, room_->inverse_z.data() + x);
+        hn::Store(hn::IfThenElse(somewhere, held, hn::Add(along, set(kNoPlace))), d, place_ + x);
+        hn::Store(inverse_z, d, inverse_z_ + x);
     }
     HWY_INLINE void put(int x, const Points& p, Mask somewhere, Float along) {
         put(x, grid_->along_u ? p.u : p.v, p.inverse_z, somewhere, along);
     }
 
-    // When all of a row, the `count`th that comes, have been put. Is there any that may be hidden?
-    HWY_INLINE bool find(int count) {
-        count_ = count;
-        const FloatTag d;
+    // When all of the row have been put. Is there any that may be hidden?
+    HWY_INLINE bool find() {
         const int end = vectors_ * kLanes;
-        hn::Store(hn::Add(hn::Iota(d, static_cast<float>(end)), set(kNoPlace)), d,
-                  room_->place.data() + end);
+        hn::Store(hn::Add(hn::Iota(FloatTag(), static_cast<float>(end)), set(kNoPlace)), FloatTag(),
+                  place_ + end);
         find_bounds();
-        any_ = find_passed();
-        splat();
+        std::memset(cells_of_row(0), 0, grid_->room() * sizeof(Nearness));
+        any_ = false;
+        const int rows = std::min(count_, shadows_->reach);
+        for (int back = 0; back <= rows; ++back)
+            if (reaches(back, shadows_->longest_of_all)) compare_with(back);
         return any_;
     }
 
-    HWY_INLINE bool may_be_hidden(int x) const { return any_ && room_->passed.data()[x / kLanes]; }
+    HWY_INLINE bool may_be_hidden(int x) const {
+        return any_ && (room_->passed.data()[counted(x / kLanes) / kLanes] >>
+                        counted(x / kLanes) % kLanes) &
+                           1;
+    }
 
     // Of those that may be: the pixels of the vector that begins at x that something hides.
     HWY_INLINE Mask hidden(int x) const {
         const FloatTag d;
-        const Float place = hn::Load(d, room_->place.data() + x);
-        const Float inverse_z = hn::Load(d, room_->inverse_z.data() + x);
+        const Float place = hn::Load(d, place_ + x);
+        const Float inverse_z = hn::Load(d, inverse_z_ + x);
         const Float bound = hn::MulAdd(inverse_z, set(1.0 + tolerance_->relative_tolerance),
                                        hn::Set(d, tolerance_->absolute_tolerance));
         // A silhouette lies anywhere between the last pixel on it and the first beside it: half a
@@ -82,7 +91,7 @@ class HiddenRow {
         const Float shortest = hn::Set(d, shadows_->shortest[band]);
         const Float longest = hn::Set(d, shadows_->longest[band]);
         for (int back = 0; back <= rows; ++back) {
-            if (nearest_of(back) * shadows_->longest[band] + kRowSlack < back) continue;
+            if (!reaches(back, shadows_->longest[band])) continue;
             const Float nearest = hn::BitCast(d, nearest_at(cells_of_row(back), cell));
             const Float nearer = hn::Sub(nearest, inverse_z);
             // A line that something hides at comes from that row.
@@ -105,120 +114,123 @@ class HiddenRow {
         return hn::ConvertTo(IntTag(), hn::Min(hn::Max(place, first), last));
     }
 
-    // What is kept of the rows that came last.
+    // Vectors are counted as places are; by blocks of as many as a vector of numbers of theirs.
+    HWY_INLINE int counted(int vector) const {
+        return grid_->near_lies_back ? vector : vectors_ - 1 - vector;
+    }
+    HWY_INLINE int blocks() const { return (vectors_ + kLanes - 1) / kLanes; }
+
+    // What is kept of the rows that came last, each in its turn.
     HWY_INLINE int slot(int back) const { return (count_ - back) % (shadows_->reach + 1); }
+    template <class T>
+    HWY_INLINE T* of_row(AlignedRow<T>& rows, int back) const {
+        return rows.data() + static_cast<std::size_t>(slot(back)) * room_->stride;
+    }
     HWY_INLINE Nearness* cells_of_row(int back) const {
         return room_->cells.data() + static_cast<std::size_t>(slot(back)) * grid_->room();
     }
-    HWY_INLINE float* limits_of_row(int back) const {
-        return room_->limits.data() + static_cast<std::size_t>(slot(back)) * room_->stride();
+    // Does anything in that row hide something in this one?
+    HWY_INLINE bool reaches(int back, float longest) const {
+        return room_->nearest[slot(back)] * longest + kRowSlack >= back;
     }
-    HWY_INLINE float& nearest_of(int back) const { return room_->nearest[slot(back)]; }
 
-    // The lowest and the highest place of each vector, and whether within it, or next behind it,
-    // a place does not lie ahead of the one before. Where the nearer of two surfaces lies ahead,
-    // places are counted backwards, so that it lies back.
+    // Of each vector: its lowest and highest place; those of all before and behind it; and whether
+    // in it, or next behind it, a place does not lie ahead of the one before. Where the nearer of
+    // two surfaces lies ahead, places and vectors are counted from the end, so that it lies back.
     HWY_INLINE void find_bounds() {
         const FloatTag d;
-        const float* HWY_RESTRICT place = room_->place.data();
-        float *low = room_->low.data(), *high = room_->high.data();
+        float *low = of_row(room_->low, 0), *high = room_->high.data();
+        Vectors* breaks = of_row(room_->breaks, 0);
+        std::fill_n(breaks, blocks(), 0);
+        std::fill_n(of_row(room_->written, 0), blocks(), 0);
+        const bool back = grid_->near_lies_back;
+        Float nearest = hn::Zero(d);
         for (int i = 0; i < vectors_; ++i) {
-            const float* at = place + i * kLanes;
+            const float* at = place_ + i * kLanes;
             const Float here = hn::Load(d, at);
+            const Float inverse_z = hn::Load(d, inverse_z_ + i * kLanes);
+            const Mask is = is_place(here);
+            nearest = hn::Max(nearest, hn::IfThenElseZero(is, inverse_z));
             const bool whole =
                 hn::AllTrue(d, hn::Ge(hn::Sub(load(at + 1), here), set(double{kMinStep})));
             float first = at[0], last = at[kLanes - 1];
             if (HWY_UNLIKELY(!whole || last >= kFirstNoPlace)) {
-                const Mask is = is_place(here);
                 const Float none = set(2 * kNoPlace);
                 first = hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(is, here, none)));
                 last = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElse(is, here, hn::Neg(none))));
             }
-            room_->passed.data()[i] = !whole && first <= last;
-            low[i] = grid_->near_lies_back ? first : -last;
-            high[i] = grid_->near_lies_back ? last : -first;
+            const int to = counted(i);
+            breaks[to / kLanes] |= Vectors{!whole && first <= last} << to % kLanes;
+            low[to] = back ? first : -last;
+            high[to] = back ? last : -first;
+        }
+        room_->nearest[slot(0)] = hn::GetLane(hn::MaxOfLanes(d, nearest));
+        // Those that round the number up to whole vectors neither come back nor are passed.
+        const auto none = static_cast<float>(2 * kNoPlace);
+        for (int i = vectors_; i % kLanes != 0; ++i) {
+            low[i] = none;
+            high[i] = -none;
+        }
+        float *before = room_->before.data(), *behind = of_row(room_->behind, 0);
+        float highest = -none, lowest = none;
+        for (int i = 0, k = vectors_ - 1; i < vectors_; ++i, --k) {
+            before[i] = highest;
+            highest = std::max(highest, high[i]);
+            behind[k] = lowest;
+            lowest = std::min(lowest, low[k]);
         }
     }
 
-    HWY_INLINE bool find_passed() {
-        const int n = vectors_;
-        std::uint8_t* passed = room_->passed.data();
-        const float *low = room_->low.data(), *high = room_->high.data();
-        float* limits = limits_of_row(0);
-        float limit = 2 * kFirstNoPlace;
-        bool any = false;
-        for (int k = 0; k < n; ++k) {
-            const int i = grid_->near_lies_back ? n - 1 - k : k;
-            passed[i] |= limit - high[i] < kMinStep;
-            any |= passed[i];
-            limits[i] = limit;
-            limit = std::min(limit, low[i]);
-        }
-        const int rows = std::min(count_, shadows_->reach);
-        for (int back = 1; back <= rows; ++back) {
-            if (nearest_of(back) * shadows_->longest_of_all + kRowSlack < back) continue;
-            const float* from = limits_of_row(back);
-            int more = 0;
-            for (int i = 0; i < n; ++i) {
-                const bool overlaps = from[i] - high[i] < -static_cast<float>(kMinOverlap);
-                passed[i] |= overlaps;
-                more |= overlaps;
-            }
-            any |= more != 0;
-        }
-        return any;
-    }
-
-    HWY_INLINE void splat() {
+    // What of the row so far back comes back over what of this one is passed.
+    HWY_INLINE void compare_with(int back) {
         const FloatTag d;
-        Nearness* cells = cells_of_row(0);
-        std::memset(cells, 0, grid_->room() * sizeof(Nearness));
-        Float nearest = hn::Zero(d);
-        const auto end = static_cast<float>(grid_->count);
-        // Of two at one place the nearer is written later.
-        for (int k = 0; k < vectors_; ++k) {
-            const int i = grid_->near_lies_back ? k : vectors_ - 1 - k;
-            const float low = room_->low.data()[i], high = room_->high.data()[i];
-            const bool seen = grid_->near_lies_back ? high >= RowGrid::kBefore && low < end
-                                                    : low <= -RowGrid::kBefore && high > -end;
-            if (seen && low <= high) nearest = hn::Max(nearest, splat(i, cells));
+        const float *low = of_row(room_->low, back), *high = room_->high.data();
+        const float *behind = of_row(room_->behind, back), *before = room_->before.data();
+        const Vectors* breaks = of_row(room_->breaks, back);
+        Vectors *written = of_row(room_->written, back), *passed = room_->passed.data();
+        const Float apart = set(back == 0 ? double{kMinStep} : -double{kMinOverlap});
+        const auto bits_of = [&](const float* upper, const float* lower) HWY_ATTR {
+            return bits(hn::Lt(hn::Sub(hn::Load(d, upper), hn::Load(d, lower)), apart));
+        };
+        for (int i = 0; i < blocks(); ++i) {
+            const int first = i * kLanes;
+            const Vectors here = back == 0 ? breaks[i] : passed[i];
+            passed[i] = here | bits_of(behind + first, high + first);
+            any_ |= passed[i] != 0;
+            Vectors come = bits_of(low + first, before + first) | (back == 0 ? breaks[i] : 0);
+            come &= ~written[i];
+            written[i] |= come;
+            for (; come; come &= come - 1) {
+                const int k = first_of(come);
+                write(counted(first + k), back, (breaks[i] >> k) & 1);
+            }
         }
-        nearest_of(0) = hn::GetLane(hn::MaxOfLanes(d, nearest));
     }
 
-    // Returns how near the pixels of the vector are, 0 where nothing is.
-    HWY_INLINE Float splat(int vector, Nearness* cells) const {
+    // Raises cells of that row to how near the vector's pixels are.
+    HWY_INLINE void write(int vector, int back, bool breaks) const {
         const FloatTag d;
         const IntTag di;
-        const Float place = hn::Load(d, room_->place.data() + vector * kLanes);
+        Nearness* cells = cells_of_row(back);
+        const Float place = hn::Load(d, of_row(room_->place, back) + vector * kLanes);
         const Mask is = is_place(place);
         const Float inverse_z =
-            hn::IfThenElseZero(is, hn::Load(d, room_->inverse_z.data() + vector * kLanes));
+            hn::IfThenElseZero(is, hn::Load(d, of_row(room_->inverse_z, back) + vector * kLanes));
         const Int cell = to_cell(place);
         const auto near = hn::DemoteTo(ShortTag(), hn::ShiftRight<16>(hn::BitCast(di, inverse_z)));
+        HWY_ALIGN std::int32_t at[kLanes];
+        hn::Store(cell, di, at);
         // Usually from cell to cell: all are written at once if this moves none by more than one,
         // and they all move alike.
-        const int first = to_cell_at(vector * kLanes + kLanes / 2) - kLanes / 2;
+        const int first = at[kLanes / 2] - kLanes / 2;
         const Int off = hn::Abs(hn::Sub(hn::Sub(cell, hn::Iota(di, 0)), set(first)));
-        const bool alike = !room_->passed.data()[vector];
-        if (alike && hn::AllTrue(d, hn::And(is, hn::RebindMask(d, hn::Lt(off, set(2)))))) {
-            hn::StoreU(near, ShortTag(), cells + first);
-            return inverse_z;
+        if (!breaks && hn::AllTrue(d, hn::And(is, hn::RebindMask(d, hn::Lt(off, set(2)))))) {
+            Nearness* to = cells + first;
+            return hn::StoreU(hn::Max(hn::LoadU(ShortTag(), to), near), ShortTag(), to);
         }
-        HWY_ALIGN std::int32_t at[kLanes];
         HWY_ALIGN Nearness nearness[kLanes];
-        hn::Store(cell, di, at);
         hn::Store(near, ShortTag(), nearness);
-        for (int i = 0; i < kLanes; ++i) {
-            const int lane = grid_->near_lies_back ? i : kLanes - 1 - i;
-            if (nearness[lane]) cells[at[lane]] = nearness[lane];
-        }
-        return inverse_z;
-    }
-
-    HWY_INLINE int to_cell_at(int x) const {
-        const float place = std::min(room_->place.data()[x], grid_->count - 1.0f);
-        return static_cast<int>(std::max(place, static_cast<float>(RowGrid::kBefore)));
+        for (int i = 0; i < kLanes; ++i) cells[at[i]] = std::max(cells[at[i]], nearness[i]);
     }
 
     // What is nearest in these cells and the ones behind them, as the upper half of a float.
@@ -242,7 +254,8 @@ class HiddenRow {
     const CellGrid* tolerance_;
     HiddenRoom* room_;
     const Shadows* shadows_;
-    int width_, vectors_, count_ = 0;
+    int width_, vectors_, count_;
+    float *place_ = nullptr, *inverse_z_ = nullptr;  // of this row
     bool any_ = false;
 };
 

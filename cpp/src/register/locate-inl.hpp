@@ -32,6 +32,15 @@ HWY_INLINE int first_of(Vectors vectors) {
     return static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(vectors));
 }
 
+// A bit for each lane.
+HWY_INLINE Vectors bits(Mask mask) {
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(FloatTag(), mask, bytes);
+    Vectors out;
+    std::memcpy(&out, bytes, sizeof out);
+    return out;
+}
+
 // A number plus kLarge is rounded to a whole one, of which the bits less kLargeBits are the
 // integer. Holds up to 4 million, and is cheaper than a conversion, which has to look out for
 // overflow.

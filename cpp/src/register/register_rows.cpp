@@ -90,14 +90,14 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
     std::uint8_t codes[kLanes];
     const RowOrder order(task, begin, end);
     for (int i = -order.before; i < order.count; ++i) {
-        const int y = order.row(i), nth = order.before + i;
+        const int y = order.row(i);
         const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(*task.depth, y, *task.room);
-        HiddenRow hidden(task, order.shadows, width);
+        HiddenRow hidden(task, order.shadows, width, order.before + i);
         const SlowRow slow{task, row, depth, hidden};
         if (i < 0) {
             put(slow, hidden, 0);
-            hidden.find(nth);
+            hidden.find();
             continue;
         }
         T* out = reinterpret_cast<T*>(static_cast<char*>(task.registered.data) +
@@ -121,9 +121,9 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
 #if HWY_TARGET != HWY_SCALAR
         if (whole > 0)
             register_usual(UsualRow<T, kChannels>(task, source, depth, y, out, mask), whole, hidden,
-                           nth, sample_at);
+                           sample_at);
 #endif
-        if (whole == 0 && task.row_grid) hidden.find(nth);
+        if (whole == 0 && task.row_grid) hidden.find();
         for (int x = whole; x < width; x += kLanes) sample_at(x);
     }
 }
@@ -152,11 +152,11 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
         const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(*task.depth, y, *task.room);
         float* out = map + 2 * static_cast<std::size_t>(y) * width;
-        HiddenRow hidden(task, order.shadows, width);
+        HiddenRow hidden(task, order.shadows, width, order.before + i);
         const SlowRow slow{task, row, depth, hidden};
         if (task.row_grid) {
             put(slow, hidden, 0);
-            hidden.find(order.before + i);
+            hidden.find();
         }
         if (i < 0) continue;
         for (int x = 0; x < width; x += kLanes) {
@@ -200,13 +200,13 @@ HWY_EXPORT(stretches_bytes);
 
 void HiddenRoom::keep(int width, const RowGrid& grid) {
     constexpr int kRoom = 128;  // two vectors more, whatever their length
-    place.keep(width + kRoom);
-    inverse_z.keep(width + kRoom);
-    for (auto* row : {&low, &high}) row->keep(width + kRoom);
-    passed.keep(width + kRoom);
-    constexpr int rows = RowGrid::kMaxReach + 1;
-    limits.keep(rows * stride());
-    cells.keep(rows * grid.room());
+    constexpr int kRows = RowGrid::kMaxReach + 1;
+    stride = (width + kRoom) / 64 * 64;
+    for (auto* row : {&place, &inverse_z, &low, &behind}) row->keep(kRows * stride);
+    for (auto* row : {&breaks, &written}) row->keep(kRows * stride);
+    for (auto* row : {&high, &before}) row->keep(stride);
+    passed.keep(stride);
+    cells.keep(kRows * grid.room());
     stretches.keep(HWY_DYNAMIC_DISPATCH(stretches_bytes)(width));
 }
 

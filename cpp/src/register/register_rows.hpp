@@ -22,17 +22,17 @@ void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begi
 
 // What a thread has of its own to find what is hidden in a row (hidden_row-inl.hpp).
 struct HiddenRoom {
+    int stride = 0;                      // of what is kept of this row and of those before it
     AlignedRow<float> place, inverse_z;  // by pixels
-    AlignedRow<float> low, high;         // by vectors, as what follows
-    AlignedRow<std::uint8_t> passed;
-    // Of this row and of those that came before it, as many as shadows reach.
-    AlignedRow<float> limits;
+    AlignedRow<float> low, behind;       // by vectors
+    AlignedRow<std::uint32_t> breaks, written;  // by blocks of vectors
     AlignedRow<Nearness> cells;
     float nearest[RowGrid::kMaxReach + 1] = {};
+    AlignedRow<float> high, before;  // of this row alone, by vectors
+    AlignedRow<std::uint32_t> passed;
     AlignedRow<char> stretches;  // a row of what is located
 
     void keep(int width, const RowGrid& grid);
-    int stride() const { return low.size(); }
 };
 
 // What all rows of a frame have in common. `cells` and `row_grid` are null where occlusion is not

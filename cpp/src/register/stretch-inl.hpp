@@ -432,11 +432,10 @@ HWY_INLINE Vectors UsualRow<T, kChannels>::sample(int begin, int count, Stretch&
     return gather<T, kChannels, false>(source, others, stretch, to, codes);
 }
 
-// The whole vectors of a row, of which one(x) does those that are not usual. The row is the
-// `count`th of those in which hidden pixels are looked for.
+// The whole vectors of a row, of which one(x) does those that are not usual.
 template <class T, int kChannels, class One>
 HWY_INLINE void register_usual(const UsualRow<T, kChannels>& row, int whole, HiddenRow& hidden,
-                               int count, const One& one) {
+                               const One& one) {
     const RowsTask& task = row.task;
     const int vectors = whole / kLanes;
     const auto finish = [&](int begin, Vectors others) HWY_ATTR {
@@ -461,7 +460,7 @@ HWY_INLINE void register_usual(const UsualRow<T, kChannels>& row, int whole, Hid
     for (int i = 0; i < vectors; i += kVectors)
         row.template locate<Hiding::row>(i * kLanes, std::min(kVectors, vectors - i),
                                          stretches[i / kVectors], {nullptr, &hidden});
-    const bool any = hidden.find(count);
+    const bool any = hidden.find();
     for (int i = 0; i < vectors; i += kVectors) {
         const int begin = i * kLanes, n = std::min(kVectors, vectors - i);
         const Vectors others = row.sample(begin, n, stretches[i / kVectors]);
