@@ -87,20 +87,20 @@ struct Registrar::Stream {
     RegistrarOptions options;
     Projector projector;
     CellGrid grid;
-    RowGrid row_grid;
     int threads;
     int parts;
     bool occlusion;
+    RowGrid row_grid;
     Workers workers;
     std::mutex mutex;
     std::vector<std::unique_ptr<Scratch>> spare;
 
     Stream(const Rig& for_rig, const RegistrarOptions& with)
-        : rig(for_rig), options(with), projector(rig), grid(rig), row_grid(rig),
+        : rig(for_rig), options(with), projector(rig), grid(rig),
           threads(resolve_threads(options.num_threads)), parts(std::min(threads, kMaxParts)),
           // Cameras at one place see the same.
           occlusion(options.occlusion != Occlusion::ignore && rig.t().norm() > 0),
-          workers(threads) {
+          row_grid(occlusion ? RowGrid(rig) : RowGrid()), workers(threads) {
         give_back(take());  // for the first frame
     }
 
