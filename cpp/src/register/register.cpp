@@ -80,6 +80,7 @@ struct Registrar::Stream {
         std::vector<Nearness> cells;
         DepthRows depth;
         std::vector<DepthRows::Room> rooms;  // one a thread
+        std::vector<HiddenRoom> hidden;      // also one a thread
     };
 
     Rig rig;
@@ -89,6 +90,7 @@ struct Registrar::Stream {
     int threads;
     int parts;
     bool occlusion;
+    RowGrid row_grid;
     Workers workers;
     std::mutex mutex;
     std::vector<std::unique_ptr<Scratch>> spare;
@@ -98,7 +100,7 @@ struct Registrar::Stream {
           threads(resolve_threads(options.num_threads)), parts(std::min(threads, kMaxParts)),
           // Cameras at one place see the same.
           occlusion(options.occlusion != Occlusion::ignore && rig.t().norm() > 0),
-          workers(threads) {
+          row_grid(occlusion ? RowGrid(rig) : RowGrid()), workers(threads) {
         give_back(take());  // for the first frame
     }
 
@@ -112,8 +114,12 @@ struct Registrar::Stream {
             }
         }
         auto scratch = std::make_unique<Scratch>();
-        if (occlusion) scratch->cells.resize((parts + 1) * cells_with_room(grid));
         scratch->rooms.resize(threads);
+        scratch->hidden.resize(threads);
+        if (!occlusion) return scratch;
+        if (!row_grid.serves) scratch->cells.resize((parts + 1) * cells_with_room(grid));
+        else
+            for (HiddenRoom& room : scratch->hidden) room.keep(rig.reference.width, row_grid);
         return scratch;
     }
 
@@ -122,19 +128,19 @@ struct Registrar::Stream {
         spare.push_back(std::move(scratch));
     }
 
-    // Calls work(part, begin, end) on all of so many rows, a thread a part.
+    // Calls work(part, begin, end) on all of so many rows, a thread a part, some at a time.
     template <class Work>
-    void share_out(int num_parts, int rows, const Work& work) {
+    void share_out(int num_parts, int rows, int at_a_time, const Work& work) {
         std::atomic<int> next{0};
         workers.each(num_parts, [&](int part) {
-            for (int y = next.fetch_add(kRows); y < rows; y = next.fetch_add(kRows))
-                work(part, y, std::min(rows, y + kRows));
+            for (int y = next.fetch_add(at_a_time); y < rows; y = next.fetch_add(at_a_time))
+                work(part, y, std::min(rows, y + at_a_time));
         });
     }
 
-    // Splats all of the depth, then calls work(task, begin, end) on all rows of the reference, with
-    // what is the same for all of them in `task`. Its cells are null where nothing can be hidden,
-    // or nobody asks.
+    // Calls work(task, begin, end) on all rows of the reference, with what is the same for all of
+    // them in `task`: the means to tell what is hidden too, where something can be, and it is
+    // `asked` for. If these are a grid of cells, all of the depth is splat first.
     template <class Work>
     void each_row(RowsTask task, const DepthView& depth, bool asked, const Work& work) {
         const int height = rig.reference.height;
@@ -142,16 +148,17 @@ struct Registrar::Stream {
         DepthRows& rows = scratch->depth;
         rows.set(depth, rig.reference.width, height);
         for (DepthRows::Room& room : scratch->rooms) rows.prepare(room);
-        if (occlusion && asked) {
+        if (occlusion && asked && row_grid.serves) task.row_grid = &row_grid;
+        else if (occlusion && asked) {
             Nearness* cells = scratch->cells.data();
             const std::size_t size = cells_with_room(grid);
             workers.each(parts,
                          [&](int part) { std::fill_n(cells + part * size, size, Nearness{0}); });
-            share_out(parts, height, [&](int part, int begin, int end) {
+            share_out(parts, height, kRows, [&](int part, int begin, int end) {
                 splat_rows(projector, rows, scratch->rooms[part], grid, begin, end,
                            cells + part * size);
             });
-            share_out(threads, grid.height, [&](int, int begin, int end) {
+            share_out(threads, grid.height, kRows, [&](int, int begin, int end) {
                 join_cells(grid, cells, parts, begin, end, cells + parts * size);
             });
             task.cells = cells + parts * size;
@@ -160,9 +167,11 @@ struct Registrar::Stream {
         task.depth = &rows;
         task.grid = &grid;
         task.hide = options.occlusion == Occlusion::hide;
-        share_out(threads, height, [&](int part, int begin, int end) {
+        const int at_a_time = task.row_grid ? row_grid.rows_at_a_time() : kRows;
+        share_out(threads, height, at_a_time, [&](int part, int begin, int end) {
             RowsTask of_thread = task;
             of_thread.room = &scratch->rooms[part];
+            of_thread.hidden = &scratch->hidden[part];
             work(of_thread, begin, end);
         });
         give_back(std::move(scratch));
