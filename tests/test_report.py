@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-from conftest import run
+from conftest import FRAMES, run
 from xcalib import overlays
 from xcalib.report import charts
 
@@ -50,6 +50,22 @@ def test_the_page_is_whole_and_alone(calibrated: tuple[Path, Result], page: Path
     for name in document["files"]:
         assert Path(name).stem in text
     assert document["run"]["arguments"][1] in text
+
+
+def test_the_page_of_a_run_without_python(
+    cli: Callable[..., Any], rendered: Path, tmp_path: Path
+) -> None:
+    """Which found its frames from another folder."""
+    inputs = ("visible", "thermal", "--depth", "depth")
+    small = ("--working-width", 80, "--frames", 3, "--search", "off", "--initial", "rig.yaml")
+    files = ("-o", tmp_path / "rig.yaml", "--report", tmp_path / "report.json")
+    made = cli("--json", "calibrate", *inputs, *small, *files, cwd=rendered)
+    assert made.returncode in (0, 3), made.stderr
+    document = json.loads((tmp_path / "report.json").read_text())
+    assert document["run"]["program"] == "xcalib-cli" and len(document["run"]["choice"]) == FRAMES
+    result = run("report", tmp_path, "-o", tmp_path / "a.html")
+    assert result.exit_code == 0, result.output
+    assert "xcalib-cli --json calibrate visible" in (tmp_path / "a.html").read_text()
 
 
 def test_names_are_escaped(calibrated: tuple[Path, Result], tmp_path: Path) -> None:
