@@ -145,21 +145,21 @@ json.dump(shown, sys.stdout)
 """
 
 
-@pytest.mark.parametrize("lens", [NONE, BROWN5, BROWN8])
+@pytest.mark.parametrize("lens", [NONE, BROWN8])
 def test_mrcal_reads_its_files(tmp_path: Path, lens: Lens) -> None:
-    system = "/usr/bin/python3"  # Debian's package is for Debian's Python
-    if subprocess.run([system, "-c", "import mrcal"], capture_output=True, check=False).returncode:
-        pytest.skip("no mrcal: `apt-get install python3-mrcal`")
     rig = rig_with(lens)
     write_rig(rig, tmp_path, "mrcal")
     names = [str(tmp_path / f"{name}.cameramodel") for name in NAMES]
-    result = subprocess.run(
-        [system, "-c", MRCAL, *names],
+    result = subprocess.run(  # Debian's package is for Debian's Python
+        ["/usr/bin/python3", "-c", MRCAL, *names],
         input=json.dumps(POINTS.tolist()),
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
+    if "No module named 'mrcal'" in result.stderr:
+        pytest.skip("no mrcal: `apt-get install python3-mrcal`")
+    assert result.returncode == 0, result.stderr
     first, second = map(np.array, json.loads(result.stdout))
     assert far_apart(first, projected(rig.reference, POINTS)) < 1e-6
     assert far_apart(second, projected(rig.source, in_source(rig))) < 1e-6

@@ -12,7 +12,6 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from click.testing import Result
 
 from conftest import run
 from xcalib import overlays
@@ -21,17 +20,29 @@ from xcalib.report import charts
 Refused = Callable[..., str]
 
 
+SMALL = ("--working-width", 80, "--frames", 3, "--search", "off", "--quiet")
+
+
 @pytest.fixture(scope="module")
-def page(calibrated: tuple[Path, Result], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder, _ = calibrated
-    path = tmp_path_factory.mktemp("page") / "report.html"
-    result = run("report", folder / "report.json", "-o", path)
+def made(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with rig.yaml, report.json and report.html, of a quick calibration."""
+    folder = tmp_path_factory.mktemp("made")
+    inputs = (rendered / "visible", rendered / "thermal", "--depth", rendered / "depth")
+    more = ("--initial", rendered / "rig.yaml", "-o", folder / "rig.yaml")
+    result = run("calibrate", *inputs, *SMALL, *more, "--report", folder / "report.json")
+    assert result.exit_code in (0, 3), result.output
+    result = run("report", folder, "-o", folder / "report.html")
     assert result.exit_code == 0, result.output
-    return path
+    return folder
 
 
-def test_the_report_says_how_to_repeat_it(calibrated: tuple[Path, Result]) -> None:
-    document = json.loads((calibrated[0] / "report.json").read_text())
+@pytest.fixture(scope="module")
+def page(made: Path) -> Path:
+    return made / "report.html"
+
+
+def test_the_report_says_how_to_repeat_it(made: Path) -> None:
+    document = json.loads((made / "report.json").read_text())
     facts = document["run"]
     assert facts["program"] == "xcalib" and facts["directory"] == str(Path.cwd())
     assert facts["arguments"][0] == "calibrate" and "--depth" in facts["arguments"]
@@ -40,26 +51,44 @@ def test_the_report_says_how_to_repeat_it(calibrated: tuple[Path, Result]) -> No
     assert all(row["reason"] for row in facts["choice"])
 
 
-def test_the_page_is_whole_and_alone(calibrated: tuple[Path, Result], page: Path) -> None:
+def test_the_page_is_whole_and_alone(made: Path, page: Path) -> None:
     text = page.read_text()
     assert len(text) < 5e6
     # No address but data and the namespace of SVG: nothing is fetched.
     assert not re.findall(r"(?:src|href)=\"(?!data:)", text)
     assert set(re.findall(r"https?://[\w./]+", text)) == {"http://www.w3.org/2000/svg"}
-    document = json.loads((calibrated[0] / "report.json").read_text())
+    document = json.loads((made / "report.json").read_text())
     for name in document["files"]:
         assert Path(name).stem in text
     assert document["run"]["arguments"][1] in text
 
 
-def test_names_are_escaped(calibrated: tuple[Path, Result], tmp_path: Path) -> None:
-    document = json.loads((calibrated[0] / "report.json").read_text())
+def test_calibrate_writes_the_page_too(rendered: Path, tmp_path: Path) -> None:
+    inputs = (rendered / "visible", rendered / "thermal", "--depth", rendered / "depth")
+    more = ("--initial", rendered / "rig.yaml", "-o", tmp_path / "rig.yaml")
+    result = run("calibrate", *inputs, *SMALL, *more, "--report", tmp_path / "a.html")
+    assert result.exit_code in (0, 3), result.output
+    assert (tmp_path / "a.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_the_page_of_a_run_of_xcalib_cli(made: Path, rendered: Path, tmp_path: Path) -> None:
+    """Whose options are the same, and which ran in another folder."""
+    document = json.loads((made / "report.json").read_text())
+    inputs = ["visible", "thermal", "--depth", "depth", "--initial", "rig.yaml"]
+    document["run"] |= {
+        "program": "xcalib-cli",
+        "arguments": ["--json", "calibrate", *inputs, "-o", str(made / "rig.yaml")],
+        "directory": str(rendered),
+    }
     document["message"] = "<b onload='alert(1)'>"
     document.pop("verdict", None)
+    document["files"] = [f"visible/{Path(name).name}" for name in document["files"]]
     (tmp_path / "report.json").write_text(json.dumps(document))
-    assert run("report", tmp_path, "-o", tmp_path / "a.html").exit_code == 0
+    result = run("report", tmp_path, "-o", tmp_path / "a.html")
+    assert result.exit_code == 0, result.output
     text = (tmp_path / "a.html").read_text()
-    assert "<b onload" not in text and "&lt;b onload" in text
+    assert "xcalib-cli --json calibrate visible" in text
+    assert "<b onload" not in text and "&lt;b onload" in text, "names are escaped"
 
 
 def change(key: str, value: Any) -> Callable[[dict[str, Any]], None]:
@@ -90,13 +119,13 @@ def change(key: str, value: Any) -> Callable[[dict[str, Any]], None]:
     ],
 )
 def test_bad_runs(
-    calibrated: tuple[Path, Result],
+    made: Path,
     tmp_path: Path,
     refused: Refused,
     spoil: Callable[[dict[str, Any]], None],
     message: str,
 ) -> None:
-    document = json.loads((calibrated[0] / "report.json").read_text())
+    document = json.loads((made / "report.json").read_text())
     spoil(document)
     (tmp_path / "report.json").write_text(json.dumps(document))
     assert message in refused("report", tmp_path / "report.json", "-o", tmp_path / "a.html")

@@ -475,6 +475,7 @@ def test_what_only_python_does_is_named(
         ("calibrate", "a", "b", "--depth", "plane", "-o", "r", "--search", "wild"),
         ("calibrate", "a", "b", "--depth", "plane", "-o", "r", "--seed", "-1"),
         ("calibrate", "a", "b", "--depth", "plane", "-o", "r", "--source-intrinsics", "1,2,3"),
+        ("calibrate", "a", "b", "--depth", "plane", "-o", "r", "--report", "page.html"),
         ("register", "r", "a", "b", "--depth-sync", "each", "-o", "x"),
         ("bench", "--reference", "wide"),
     ],

@@ -26,4 +26,5 @@
 // What is done with the rig: kept in a file, and used on a stream of frames.
 #include "xcalib/rig_file.hpp"
 #include "xcalib/register.hpp"
+#include "xcalib/transfer.hpp"
 // clang-format on

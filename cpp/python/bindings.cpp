@@ -52,6 +52,7 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_steady_depth(m);
 
     xcalib::bind_stream(m);
+    xcalib::bind_transfer(m);
     xcalib::bind_sequence(m);
     xcalib::bind_pairs(m);
     xcalib::bind_frames(m);

@@ -30,6 +30,7 @@ void bind_complete_depth(pybind11::module_& m);
 void bind_steady_depth(pybind11::module_& m);
 
 void bind_stream(pybind11::module_& m);
+void bind_transfer(pybind11::module_& m);
 void bind_pairs(pybind11::module_& m);
 void bind_sequence(pybind11::module_& m);
 void bind_frames(pybind11::module_& m);

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from xcalib import convert, metrics
+    from xcalib import convert, labels, metrics
     from xcalib._core import (
         AdamOptions,
         CalibrationOptions,
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         CalibrationResult,
         CandidateReport,
         ExpectedError,
+        FrameTransfer,
         LagFit,
         LagReport,
         Lens,
@@ -41,7 +42,7 @@ else:
         """Import what a name stands for when it is first used: `xcalib --version` needs nothing."""
         if name == "__version__":
             value = import_module("importlib.metadata").version("xcalib-rgbt")
-        elif name in ("convert", "metrics"):
+        elif name in ("convert", "labels", "metrics"):
             value = import_module(f"xcalib.{name}")
         elif name == "choose_frames":
             value = import_module("xcalib.choose").choose_frames
@@ -63,6 +64,7 @@ __all__ = [
     "CalibrationResult",
     "CandidateReport",
     "ExpectedError",
+    "FrameTransfer",
     "LagFit",
     "LagReport",
     "Lens",
@@ -79,5 +81,6 @@ __all__ = [
     "choose_frames",
     "convert",
     "fit_lags",
+    "labels",
     "metrics",
 ]

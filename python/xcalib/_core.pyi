@@ -220,6 +220,50 @@ class Rig:
         """The rig for images of these sizes [px]: itself, or resized where both have its
         aspects, to within a pixel. Raises InputError where one has not.
         """
+    def transfer(
+        self, points: ArrayLike, depth: NDArray[Any] | ArrayLike, beyond: bool = False
+    ) -> NDArray[float64]:
+        """Points (N, 2) of the reference image in the source image: (N, 2) [px].
+
+        depth: the frame's map (h, w) float32 [m], a number [m], or one of each point, (N,).
+        NaN where there is none: outside of the source image (beyond: only where the camera
+        cannot see), or the depth unknown. What the source sees something nearer in front of
+        is given: FrameTransfer says so.
+        """
+    def transfer_back(
+        self, points: ArrayLike, depth: NDArray[Any] | ArrayLike, beyond: bool = False
+    ) -> NDArray[float64]:
+        """Points (N, 2) of the source image in the reference image: (N, 2) [px].
+
+        depth: the frame's map (h, w) float32 [m] of the reference, or of each point its depth
+        in the reference camera, a number or (N,). With a map it is what is in front that
+        counts. NaN where there is none: outside of the reference image (beyond: given too
+        where depth is a number), depth unknown, or between a near and a far surface.
+        """
+
+class FrameTransfer:
+    """Points from either image of a frame to the other, through its depth.
+
+    Codes are those of a mask: 0 valid, 1 outside (or nothing there that the reference shows),
+    2 occluded (the source sees something nearer; the point is given), 3 no depth, and 4
+    ambiguous (between a near and a far surface).
+    """
+    def __init__(self, rig: Rig, depth: NDArray[Any]) -> None:
+        """depth: (h, w) float32 [m], of any size of the reference's aspect, 0 unknown."""
+    def to_source(
+        self, points: ArrayLike
+    ) -> tuple[NDArray[float64], NDArray[float64], NDArray[uint8]]:
+        """(points, depths, codes) of reference points (N, 2): (N, 2) [px], which lie beyond the
+        image where they are outside; depth in the reference camera (N,) [m]; (N,) uint8.
+        """
+    def to_reference(
+        self, points: ArrayLike
+    ) -> tuple[NDArray[float64], NDArray[float64], NDArray[uint8]]:
+        """The same of source points (N, 2); NaN where not valid."""
+    def inverse_map(self, width: int, height: int) -> NDArray[float32]:
+        """(height, width, 2) float32 of the source's size: reference coordinates of each source
+        pixel [px], NaN where there are none. The inverse of Registrar.map().
+        """
 
 class SearchOptions:
     """The global search that starts a calibration."""
@@ -410,7 +454,8 @@ class LensReport:
     @property
     def gain(self) -> float:
         """In NEC by the last one that was tried, of frames that the fit has not seen:
-        the mean; of all frames where they gain too little to look further."""
+        the mean; of all frames where they gain too little to look further.
+        """
     @property
     def gain_deviation(self) -> float:
         """The standard deviation of that mean; 0 of all frames."""
@@ -1087,8 +1132,9 @@ def report_document(
 ) -> str:
     """JSON text of a report, as `xcalib calibrate --report` writes it.
 
-    files: those of its frames. arguments: of `xcalib`, which was run in directory. lag: of the
-    sources, that was taken up [frames]. choice: (file, taken, reason) of the frames looked at.
+    files: those of its frames. arguments: of `xcalib`, which was run in directory. lag: of
+    the sources, that was taken up [frames]. choice: (file, taken, reason) of the frames
+    looked at.
     """
 
 def evaluation_document(evaluation: Evaluation, rig_file: str, files: Sequence[str]) -> str:

@@ -14,7 +14,18 @@ import click
 from .errors import ErrorsInOneLine, open_standard_streams
 from .options import ARGUMENTS
 
-COMMANDS = ("calibrate", "convert", "demo", "evaluate", "inspect", "models", "register", "report")
+COMMANDS = (
+    "calibrate",
+    "convert",
+    "demo",
+    "evaluate",
+    "inspect",
+    "models",
+    "register",
+    "report",
+    "transfer",
+    "view",
+)
 
 
 class Commands(ErrorsInOneLine):
