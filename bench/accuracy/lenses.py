@@ -2,9 +2,9 @@
 
 Rendered streets of 12 frames (480x360, source 480x384), exact depth; errors of the mapping against
 the truth, over the pixels that both see, in px of the reference at 640 px of width. A source of 120
-degrees is a fisheye, whose reference is a pinhole of 70 to 86; where both bend, the reference's lens is
-given. `data/board`: a real rig, each half of its pairs judged by the fit to the other, at discs
-that were measured, in px of the thermal image; their own noise is about 1 px.
+degrees is a fisheye, whose reference is a pinhole of 70 to 86; where both bend, the reference's
+lens is given. `data/board`: a real rig, each half of its pairs judged by the fit to the other, at
+discs that were measured, in px of the thermal image; their own noise is about 1 px.
 """
 
 import argparse
@@ -100,8 +100,8 @@ def synthetic_kind(name, seeds):
             found.setdefault(how, []).append(error)
             k = [round(c, 3) for c in result.rig.source.lens.coefficients[:2]]
             print(
-                f"{name}, rig {seed}, {how}: {np.median(error):.3f} / {np.percentile(error, 95):.2f}"
-                f" px, k {k}, {result.report.message}",
+                f"{name}, rig {seed}, {how}: {np.median(error):.3f} px,"
+                f" 95 % {np.percentile(error, 95):.2f} px, k {k}, {result.report.message}",
                 flush=True,
             )
     for how, parts in found.items():

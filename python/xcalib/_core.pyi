@@ -348,8 +348,8 @@ class CalibrationOptions:
     rig, or none.
     """
     source_lens: Lens | None
-    """Lens of the source's images, frozen. None: that of source_camera or of the initial rig, or
-    none.
+    """Lens of the source's images, frozen. None: that of source_camera or of the initial rig;
+    else k1 and k2 are estimated and kept where unseen frames gain.
     """
     reference_hfov_deg: float | None
     """Horizontal field of view to assume [deg], or None to search it."""
@@ -358,7 +358,9 @@ class CalibrationOptions:
     always does.
     """
     optimize_lens: bool
-    """x"""
+    """Free k1 and k2 of the source's lens, from source_lens where it is given, and keep them
+    whether or not unseen frames gain; the solver 'adam' has a lens so only.
+    """
     relative_depth: RelativeDepth | None
     """RelativeDepth that the depth maps were made with: the shift is estimated, the scale kept,
     and the rig has both. None: metric depth.

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "xcalib/error.hpp"
-
 #include "xcalib/parameters.hpp"
 #include "xcalib/threads.hpp"
 
@@ -61,9 +60,9 @@ void CalibrationOptions::validate() const {
         throw std::invalid_argument(
             "options: optimize_lens beside source_camera, which is kept, expected one of them");
     if (optimize_lens && source_lens && !has_lens_parameters(*source_lens))
-        throw std::invalid_argument("options: optimize_lens with source_lens = " +
-                                    Lens::word(source_lens) +
-                                    ", expected brown of 4 or 5 coefficients, or none given");
+        throw std::invalid_argument(
+            "options: optimize_lens with source_lens = " + Lens::word(source_lens) +
+            ", expected brown of 4 or 5 coefficients, or none given");
     require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
             search.max_fov_ratio, "a ratio in (1, 10]");
     require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",

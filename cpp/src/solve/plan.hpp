@@ -37,8 +37,8 @@ struct Plan {
     // one that is estimated bends.
     int lens_coefficients = 0;
     // The reference's principal point, and both of its focal lengths together, move at the finer
-    // levels where the source's lens bends: of pinholes they are a gauge, but a lens bends about one
-    // point, and is as strong as it is at one focal length only.
+    // levels where the source's lens bends: of pinholes they are a gauge, but a lens bends about
+    // one point, and is as strong as it is at one focal length only.
     bool fits_gauge;
 };
 
