@@ -112,16 +112,6 @@ TEST(Lens, DerivativesAgreeWithCentralDifferences) {
                 (*lens.distort(point + step) - *lens.distort(point - step)) / (2 * kStep);
         }
         EXPECT_LT((lens.derivative(point) - numeric).norm(), 1e-7 * numeric.norm()) << i;
-        if (lens.model() != LensModel::brown) continue;
-        for (int k = 0; k < 2; ++k) {
-            std::vector<double> more = lens.coefficients(), less = more;
-            more[k] += kStep;
-            less[k] -= kStep;
-            numeric.col(k) = (*Lens(LensModel::brown, more).distort(point) -
-                              *Lens(LensModel::brown, less).distort(point)) /
-                             (2 * kStep);
-        }
-        EXPECT_LT((lens.derivative_by_k1_k2(point) - numeric).norm(), 1e-7 * numeric.norm()) << i;
     }
     const Lens fisheye(LensModel::fisheye, {0.1, 0, 0, 0});
     EXPECT_EQ(fisheye.derivative({0, 0}), Eigen::Matrix2d::Identity()) << "on the axis";

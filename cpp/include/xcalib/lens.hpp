@@ -52,8 +52,6 @@ class Lens {
 
     // d distort / d point. Symmetric.
     Eigen::Matrix2d derivative(const Eigen::Vector2d& point) const;
-    // d distort / d (k1, k2) of a brown, or of none, which is a brown of zeros.
-    Eigen::Matrix2d derivative_by_k1_k2(const Eigen::Vector2d& point) const;
 
     // The same lens seen through its image flipped left to right.
     Lens flipped() const;

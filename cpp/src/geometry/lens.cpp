@@ -161,15 +161,6 @@ Eigen::Matrix2d Lens::derivative(const Eigen::Vector2d& point) const {
     return out;
 }
 
-Eigen::Matrix2d Lens::derivative_by_k1_k2(const Eigen::Vector2d& point) const {
-    const auto& c = coefficients_;
-    const double r2 = point.squaredNorm();
-    const double d = 1 + r2 * (c[5] + r2 * (c[6] + r2 * c[7]));
-    Eigen::Matrix2d out;
-    out << point * (r2 / d), point * (r2 * r2 / d);
-    return out;
-}
-
 // Of a point on a line through the axis, without p1 and p2: r f grows up to max_radius.
 std::optional<double> Lens::radius_of(double shown) const {
     const auto at = [&](double r) { return r * radial(r * r).f; };
