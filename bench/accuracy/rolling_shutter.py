@@ -29,7 +29,7 @@ def rolled(drive, index, share):
     height = drive.rig.source.height
     edges = np.linspace(0, height, BANDS + 1).astype(int)
     bands = []
-    for top, bottom in zip(edges[:-1], edges[1:], strict=True):
+    for top, bottom in pairwise(edges):
         middle = (top + bottom) / 2 / height
         view = drive.render_view(index + share * middle, "thermal", "source")[0]
         bands.append(view[top:bottom])
