@@ -25,7 +25,7 @@ namespace {
 struct Arguments {
     FrameArguments frames;
     std::string output, choose = "informed", colormap = "auto", initial, search = "auto",
-                        mount = "auto", flow = "auto", solver = "ceres", report,
+                        mount = "auto", flow = "auto", solver = "ceres", tolerance = "2,5", report,
                         reference_lens = "auto", source_lens = "auto";
     std::optional<std::string> reference_intrinsics, source_intrinsics;
     bool explain = false, refine_plane = false;
@@ -190,6 +190,7 @@ void run(Arguments a, bool has_report, Console& console) {
     CalibrationOptions& options = a.options;
     options.search.mode = value_of<SearchMode>("--search", a.search);
     options.mount = Mount::parse("--mount", a.mount);
+    options.tolerance = Tolerance::parse("--tolerance", a.tolerance);
     options.reference_lens = Lens::parse("--reference-lens", a.reference_lens);
     options.source_lens = Lens::parse("--source-lens", a.source_lens);
     options.flow = value_of("--flow", a.flow, flow_arguments());
@@ -368,11 +369,21 @@ void add_calibrate(CLI::App& app, Console& console) {
         ->type_name("DEG");
     command->add_flag("--optimize-reference", a.options.optimize_reference,
                       "Estimate the reference intrinsics too.  [default: kept]");
+    command->add_flag("--optimize-lens", a.options.optimize_lens,
+                      "Estimate k1 and k2 of the source's lens, from --source-lens where given, and"
+                      " keep them whether or not unseen frames gain; with --solver adam too."
+                      "  [default: kept where they gain]");
     command
         ->add_option("--working-width", a.options.working_width,
                      "Reference width that calibration works at [px].")
         ->type_name("PX")
         ->check(CLI::Range(1, 2147483647))
+        ->capture_default_str();
+    command
+        ->add_option("--tolerance", a.tolerance,
+                     "Expected error up to which the rig is trusted, over the footage's own depths"
+                     " [px of the reference at 640 px of width].")
+        ->type_name("MEDIAN[,P95]")
         ->capture_default_str();
     command->add_flag("--refine-plane", a.refine_plane,
                       "With --depth plane: find the horizon and the roll from the footage (some 17"

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "xcalib/camera.hpp"
+
 namespace xcalib::cli {
 
 using Json = nlohmann::ordered_json;
@@ -22,6 +24,9 @@ Json number(double value);
 class NotTrusted : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
+
+// The same, for a rig whose calibration was not.
+void require_trusted(const Rig& rig, const std::string& file);
 
 // Whoever read our output has gone: nothing is to be said any more.
 class ClosedPipe : public std::runtime_error {

@@ -112,7 +112,7 @@ XCALIB_C_API void xcalib_destroy(xcalib_registrar* registrar);
  * size, the source's type and channels. `mask`: width * height codes of the reference, without
  * gaps. Pixels that are not valid are 0, but for those that are only marked as occluded.
  *
- * Nothing is allocated as long as the depth has the reference's size.
+ * Nothing is allocated but for the first depth of another size than those before.
  * Several threads may call it at once. */
 XCALIB_C_API xcalib_status xcalib_register(const xcalib_registrar* registrar,
                                            const xcalib_image* source, const xcalib_image* depth,

@@ -19,6 +19,7 @@
 // How its maximum is found: a search over every displacement, then least squares.
 #include "xcalib/search.hpp"
 #include "xcalib/calibration_options.hpp"
+#include "xcalib/verdict.hpp"
 #include "xcalib/calibration_report.hpp"
 #include "xcalib/calibrate.hpp"
 

@@ -7,6 +7,7 @@
 
 namespace xcalib {
 
+void bind_verdict(pybind11::module_& m);
 void bind_lens(pybind11::module_& m);
 void bind_camera(pybind11::module_& m);
 void bind_calibration_options(pybind11::module_& m);

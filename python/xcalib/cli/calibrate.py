@@ -14,6 +14,7 @@ from .._core import (
     CalibrationOptions,
     Lens,
     Pinhole,
+    Tolerance,
     _flow_arguments,
     left_out,
     report_document,
@@ -243,12 +244,27 @@ def frames_again(arguments: list[str], lag: int) -> Frames:
     help="Estimate the reference intrinsics too.  [default: kept]",
 )
 @click.option(
+    "--optimize-lens",
+    is_flag=True,
+    default=DEFAULTS.optimize_lens,
+    help="Estimate k1 and k2 of the source's lens, from --source-lens where given, and keep them"
+    " whether or not unseen frames gain; with --solver adam too.  [default: kept where they gain]",
+)
+@click.option(
     "--working-width",
     metavar="PX",
     type=COUNT,
     default=DEFAULTS.working_width,
     show_default=True,
     help="Reference width that calibration works at [px].",
+)
+@click.option(
+    "--tolerance",
+    metavar="MEDIAN[,P95]",
+    default="2,5",
+    show_default=True,
+    help="Expected error up to which the rig is trusted, over the footage's own depths [px of the"
+    " reference at 640 px of width].",
 )
 @click.option(
     "--refine-plane",
@@ -285,7 +301,9 @@ def command(
     source_lens: str,
     reference_hfov: float | None,
     optimize_reference: bool,
+    optimize_lens: bool,
     working_width: int,
+    tolerance: str,
     refine_plane: bool,
     report_file: Path | None,
     quiet: bool,
@@ -319,11 +337,13 @@ def command(
         working_width=working_width,
         reference_hfov_deg=reference_hfov,
         optimize_reference=optimize_reference,
+        optimize_lens=optimize_lens,
     )
     calibration.search.mode = search
     calibration.search.max_roll_deg = max_roll
     calibration.search.max_fov_ratio = max_fov_ratio
     calibration.mount = mount
+    calibration.tolerance = Tolerance.parse("--tolerance", tolerance)
     calibration.reference_lens = Lens.parse("--reference-lens", reference_lens)
     calibration.source_lens = Lens.parse("--source-lens", source_lens)
     calibration.solver = solver
