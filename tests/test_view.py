@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -87,3 +89,18 @@ def test_bad_usage(refused: Callable[..., str], rendered: Path, tmp_path: Path) 
     rig = rendered / "rig.yaml"
     assert "visible" in refused("view", rig, *folders, "-o", rendered / "visible")
     assert "--overlay" in refused("view", rig, *folders, "-o", tmp_path / "o", "--overlay", "x")
+
+
+def test_a_rerun_recording(rendered: Path, tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="no rerun: `pip install rerun-sdk`")
+    result = view(rendered, tmp_path / "a.rrd")
+    assert result.exit_code == 0, result.output
+    checked = subprocess.run(
+        [sys.executable, "-m", "rerun", "rrd", "print", str(tmp_path / "a.rrd")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert checked.returncode == 0, checked.stderr
+    for entity in ("/visible/image", "/rig/thermal/image", "/cloud", "/metrics/nec"):
+        assert entity in checked.stdout

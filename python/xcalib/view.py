@@ -11,6 +11,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ._core import Registrar, Rig, is_video, keep_file
 from .footage.encoder import Encoder, join
@@ -27,9 +28,13 @@ class Registered:
     time: float
     """[s]"""
     reference: Image
+    source: Image
     image: Image
+    """The source on the reference's pixels."""
     mask: Image
     """Codes: 0 valid."""
+    depth: NDArray[np.float32]
+    """Of the reference's size [m]."""
 
     def overlay(self, kind: str) -> Picture:
         """Both in one picture, one of `overlays.KINDS`, or `side`: beside each other."""
@@ -47,7 +52,12 @@ def registered(frames: Frames, rig: Rig, threads: int) -> Iterator[Registered]:
         reference, source, depth = frames.read(index)
         image, mask = registrar.register(source, depth)
         time = index / rate_of(frames) if times is None else float(times[index])
-        yield Registered(frames.references.name(index), time, reference, image, mask)
+        name = frames.references.name(index)
+        if size_of(depth) != size_of(reference):
+            method = cv2.INTER_NEAREST
+            resized = cv2.resize(depth, size_of(reference), interpolation=method)
+            depth = np.asarray(resized, np.float32)
+        yield Registered(name, time, reference, source, image, mask, depth)
 
 
 def rate_of(frames: Frames) -> float:

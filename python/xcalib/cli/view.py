@@ -11,6 +11,7 @@ from ..frames import check_file_writable, check_folder_writable
 from ..overlays import KINDS
 from ..pipeline import progress
 from ..recording import write_recording
+from ..rerun_log import write_rerun
 from ..view import rate_of, registered, write_view
 from .arguments import (
     check_writes,
@@ -35,7 +36,7 @@ from .options import Input
     type=Input(),
     required=True,
     help="Folder of images (.png), a video (.mp4, .avi, .mkv), or a recording with the cameras and"
-    " the registered images themselves (.mcap).",
+    " the registered images themselves, for Foxglove and ROS 2 (.mcap) or Rerun (.rrd).",
 )
 @click.option(
     "--overlay",
@@ -54,12 +55,14 @@ def command(
     frames = open_frames(inputs, threads, rig)
     check_writes([output], frames, inputs, rig_file)
     suffix = output.suffix.lower()
-    if suffix in (".mp4", ".avi", ".mkv", ".mcap"):
+    if suffix in (".mp4", ".avi", ".mkv", ".mcap", ".rrd"):
         check_file_writable(str(output))
     else:
         check_folder_writable(output)
     every = progress(registered(frames, rig, threads), len(frames), "showing", quiet)
-    if suffix == ".mcap":
+    if suffix == ".rrd":
+        count = write_rerun(every, frames.fit(rig), output)
+    elif suffix == ".mcap":
         count, lines = write_recording(every, frames.fit(rig), output)
         for line in lines:
             warn(line)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import operator
 import platform
 import shlex
 from importlib import resources
@@ -115,8 +117,10 @@ def facts_of_rig(rig: Any) -> dict[str, Any]:
 
 def scores_of(run: Run) -> list[dict[str, Any]]:
     """NEC of each frame used, registered and only resized."""
-    rows = [run.frames.read(index) for index in run.chosen]
-    references, sources, depths = zip(*rows, strict=True)
+    # One frame at a time: tee hands each on to all three.
+    rows = itertools.tee((run.frames.read(index) for index in run.chosen), 3)
+    parts = (map(operator.itemgetter(i), part) for i, part in enumerate(rows))
+    references, sources, depths = parts
     found = evaluate(run.rig, references, sources, depths)
     return [
         {
