@@ -191,12 +191,14 @@ HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, Ce
 // window of them. Returns which do not; of these nothing that is written counts, so that nothing
 // waits for a branch. The source must be wider than the window.
 template <class T, Reach reach>
-HWY_INLINE Vectors sample_windows(const Source& source, int count, const Stretch& stretch, T* out,
+HWY_INLINE Vectors sample_windows(const Source& source, int count, Stretch& stretch, T* out,
                                   std::uint8_t* mask) {
     const FloatTag d;
     const IntTag di;
     constexpr int kWindow = window<T, reach>();
-    const Windows& windows = stretch.source;
+    Windows& windows = stretch.source;
+    windows.place<0>(kBefore<T, reach>, source.width - 1 - kWindow, source.height - 2, sizeof(T),
+                     static_cast<int>(source.row_bytes));
     Vectors others = 0;
     for (int i = 0; i < count; ++i) {
         const UsualVector& vector = stretch.vectors[i];
@@ -214,17 +216,19 @@ HWY_INLINE Vectors sample_windows(const Source& source, int count, const Stretch
     return others;
 }
 
-// The same in three rows of the source: where a lens bends rows, points often come into the next
-// one.
+// The same of some of the vectors, in three rows of the source: where a lens bends rows, their
+// points often come into the next one.
 template <class T, Reach reach>
-HWY_INLINE Vectors sample_windows_bent(const Source& source, int count, const Stretch& stretch,
-                                       T* out, std::uint8_t* mask) {
+HWY_INLINE Vectors sample_windows_bent(const Source& source, Vectors vectors,
+                                       const Stretch& stretch, T* out, std::uint8_t* mask) {
+    if (source.height < 3) return vectors;
     const FloatTag d;
     const IntTag di;
     constexpr int kWindow = window<T, reach>();
     const Windows& windows = stretch.source;
     Vectors others = 0;
-    for (int i = 0; i < count; ++i) {
+    for (; vectors; vectors &= vectors - 1) {
+        const int i = first_of(vectors);
         const UsualVector& vector = stretch.vectors[i];
         const Int x = hn::BitCast(di, hn::Load(d, vector.x));
         const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
@@ -291,11 +295,13 @@ HWY_INLINE Vectors gather(const Source& source, Vectors vectors, const Stretch& 
 
 #if XCALIB_FIXED
 // The same of bytes, located in fixed numbers.
-HWY_INLINE Vectors sample_fixed(const Source& source, int count, const Stretch& stretch,
+HWY_INLINE Vectors sample_fixed(const Source& source, int count, Stretch& stretch,
                                 std::uint8_t* out, std::uint8_t* mask) {
     const FloatTag d;
     const IntTag di;
-    const Windows& windows = stretch.source;
+    Windows& windows = stretch.source;
+    windows.place<kFixedBits>(kFixedWindow / 8, source.width - kFixedWindow, source.height - 2, 1,
+                              static_cast<int>(source.row_bytes));
     Vectors others = 0;
     for (int i = 0; i < count; ++i) {
         const UsualVector& vector = stretch.vectors[i];
@@ -309,13 +315,15 @@ HWY_INLINE Vectors sample_fixed(const Source& source, int count, const Stretch& 
 }
 
 // As sample_windows_bent.
-HWY_INLINE Vectors sample_fixed_bent(const Source& source, int count, const Stretch& stretch,
+HWY_INLINE Vectors sample_fixed_bent(const Source& source, Vectors vectors, const Stretch& stretch,
                                      std::uint8_t* out, std::uint8_t* mask) {
+    if (source.height < 3) return vectors;
     const FloatTag d;
     const IntTag di;
     const Windows& windows = stretch.source;
     Vectors others = 0;
-    for (int i = 0; i < count; ++i) {
+    for (; vectors; vectors &= vectors - 1) {
+        const int i = first_of(vectors);
         const UsualVector& vector = stretch.vectors[i];
         const Int x = hn::Sub(hn::BitCast(di, hn::Load(d, vector.x)), set(windows.x[i]));
         const Int y = hn::Sub(hn::BitCast(di, hn::Load(d, vector.y)), set(windows.y[i]));
@@ -395,12 +403,8 @@ struct UsualRow {
 template <class T, Reach reach>
 HWY_INLINE Vectors sample_in(const Source& source, int count, bool bends, Stretch& stretch, T* out,
                              std::uint8_t* mask) {
-    constexpr int kWindow = window<T, reach>();
-    stretch.source.place<0>(kBefore<T, reach>, source.width - 1 - kWindow, source.height - 2,
-                            sizeof(T), static_cast<int>(source.row_bytes));
-    return bends && source.height > 2
-               ? sample_windows_bent<T, reach>(source, count, stretch, out, mask)
-               : sample_windows<T, reach>(source, count, stretch, out, mask);
+    const Vectors others = sample_windows<T, reach>(source, count, stretch, out, mask);
+    return bends ? sample_windows_bent<T, reach>(source, others, stretch, out, mask) : others;
 }
 
 // The same vectors, located. Returns those of which some points lie outside the source, or nowhere.
@@ -412,12 +416,8 @@ HWY_INLINE Vectors UsualRow<T, kChannels>::sample(int begin, int count, Stretch&
 #if XCALIB_FIXED
     if constexpr (sizeof(T) == 1 && kChannels == 1) {
         if (fixed) {
-            stretch.source.place<kFixedBits>(kFixedWindow / 8, source.width - kFixedWindow,
-                                             source.height - 2, 1,
-                                             static_cast<int>(source.row_bytes));
-            others = rows.fixed.bends && source.height > 2
-                         ? sample_fixed_bent(source, count, stretch, to, codes)
-                         : sample_fixed(source, count, stretch, to, codes);
+            others = sample_fixed(source, count, stretch, to, codes);
+            if (rows.fixed.bends) others = sample_fixed_bent(source, others, stretch, to, codes);
             return gather<T, 1, true>(source, others, stretch, to, codes);
         }
     }
