@@ -18,7 +18,7 @@ namespace {
 
 // So many more frames are under way than are worked on: they wait for their turn where a stage
 // takes them in order, with what the stages before have done.
-constexpr int kWaiting = 2;
+constexpr int kWaiting = 4;
 
 std::string percentages(const BusyShares& busy) {
     std::string text;
