@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from xcalib import Pinhole, Rig
+from xcalib import Pinhole, Rig, _core
 from xcalib.footage import ImageFiles
 from xcalib.frames import (
     Image,
@@ -151,6 +151,19 @@ def test_written_images_read_back(
     assert back.dtype == dtype
     np.testing.assert_array_equal(back, image)
     assert os.listdir(tmp_path / "made") == [f"image{suffix}"]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_sizes_come_from_headers(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    write_image(path, noise(5, 7, 3))
+    assert _core.header_size(path) == (7, 5)
+    data = path.read_bytes()
+    for count in (0, 10, 23):
+        path.write_bytes(data[:count])
+        assert _core.header_size(path) is None
+    write_image(tmp_path / "a.tiff", noise(5, 7))
+    assert _core.header_size(tmp_path / "a.tiff") is None
 
 
 def test_alpha_is_dropped(tmp_path: Path) -> None:

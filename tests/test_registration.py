@@ -71,6 +71,31 @@ def test_threads_change_nothing(drive: Path, tmp_path: Path, overlay: tuple[str,
     assert one == contents(tmp_path / "4")
 
 
+def test_references_that_nobody_looks_at_are_not_decoded(drive: Path, tmp_path: Path) -> None:
+    """What is behind the header of the second one is found only where it is used."""
+    folder = tmp_path / "drive"
+    shutil.copytree(drive, folder)
+    path = list_files(folder / "visible")[1]
+    data = path.read_bytes()
+    path.write_bytes(data[:40])
+    result = register(folder, tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert contents(tmp_path / "out") == contents_of(drive, tmp_path / "whole")
+    for more in (("--overlay",), ("--depth-steady",)):
+        result = register(folder, tmp_path / more[0], *more)
+        assert result.exit_code == 2
+        assert f"{path}: cannot decode" in result.stderr
+    path.write_bytes(data[:20] + bytes([0, 0, 0, 9]) + data[24:])  # its height
+    result = register(folder, tmp_path / "size")
+    assert result.exit_code == 2
+    assert f"{path} is " in result.stderr
+
+
+def contents_of(drive: Path, out: Path) -> dict[str, bytes]:
+    assert register(drive, out).exit_code == 0
+    return contents(out)
+
+
 def test_the_summary_tells_where_the_time_goes(drive: Path, tmp_path: Path) -> None:
     line = register(drive, tmp_path / "out").stdout
     assert re.match(r"120 frames, [0-9.]+ % valid, [0-9.]+ frames/s with files", line)

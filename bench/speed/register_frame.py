@@ -69,6 +69,7 @@ def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object
     h = rig.infinite_homography.astype(np.float32)
     k = (rig.source.K @ rig.t).astype(np.float32)
     rays = [h[i, 0] * x + h[i, 1] * y + h[i, 2] for i in range(3)]
+    bytes_out = np.empty((HEIGHT, WIDTH), np.uint8)
     out, copied = np.empty((HEIGHT, WIDTH), np.float32), np.empty((HEIGHT, WIDTH), np.float32)
 
     def numpy_map(depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,6 +79,20 @@ def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object
     ready = [numpy_map(depth) for depth in depths()]
     units = [np.rint(256 * depth).astype(np.uint16) for depth in depths()]
     kitti = ours(source, depth_scale=1 / 256)
+    smaller = {
+        size: [cv2.resize(d, size, interpolation=cv2.INTER_NEAREST) for d in depths()]
+        for size in ((WIDTH // 2, HEIGHT // 2), (WIDTH // 4, HEIGHT // 4), (518, 392))
+    }
+
+    def resized(depth: np.ndarray) -> np.ndarray:
+        return cv2.resize(depth, (WIDTH, HEIGHT), interpolation=cv2.INTER_LINEAR)
+
+    def of_size(
+        image: np.ndarray, size: tuple[int, int], **options: object
+    ) -> Callable[[np.ndarray, int], object]:
+        call = ours(image, **options)
+        return lambda _, i: call(smaller[size][i], i)
+
     calls: dict[str, Callable[[np.ndarray, int], object]] = {
         "float32": ours(source),
         "float32, occlusion": ours(source, occlusion="mark"),
@@ -89,16 +104,31 @@ def contestants(rig: xcalib.Rig) -> dict[str, Callable[[np.ndarray, int], object
         "float32, source lens, occlusion": ours(source, through(rig, False), occlusion="mark"),
         "float32, both lenses, occlusion": ours(source, through(rig, True), occlusion="mark"),
         "uint8": ours(counts),
+        "uint8, occlusion": ours(counts, occlusion="mark"),
+        "uint8, colour, occlusion": ours(colour, occlusion="mark"),
         "uint16": ours(wide),
         "uint8, colour": ours(colour),
         "numpy map + cv2.remap": lambda d, _: cv2.remap(
             source, *numpy_map(d), cv2.INTER_LINEAR, dst=out
+        ),
+        "half-size depth: numpy map + cv2.resize + cv2.remap": lambda _, i: cv2.remap(
+            source,
+            *numpy_map(resized(smaller[WIDTH // 2, HEIGHT // 2][i])),
+            cv2.INTER_LINEAR,
+            dst=out,
+        ),
+        "uint8: cv2.remap, map ready": lambda _, i: cv2.remap(
+            counts, *ready[i], cv2.INTER_LINEAR, dst=bytes_out
         ),
         "cv2.remap, map ready": lambda _, i: cv2.remap(
             source, *ready[i], cv2.INTER_LINEAR, dst=out
         ),
         "copy": lambda d, _: np.copyto(copied, d),
     }
+    for size in smaller:
+        name = f"{size[0]}x{size[1]} depth"
+        calls[f"float32, occlusion, {name}"] = of_size(source, size, occlusion="mark")
+        calls[f"uint8, occlusion, {name}"] = of_size(counts, size, occlusion="mark")
     try:
         from peers.torch_register import registrar
     except ImportError:
@@ -147,6 +177,36 @@ def main() -> None:
         "float32, both lenses, occlusion",
         "float32, occlusion",
         "<= 1.4",
+    )
+    for size in ("640x480", "320x240", "518x392"):
+        for kind, target in (("float32", "<= 1.15"), ("uint8", "<= 1.2")):
+            full = f"{kind}, occlusion"
+            ratio(
+                f"{full}, with {size} depth, times full-size", f"{full}, {size} depth", full, target
+            )
+    ratio(
+        "with half-size depth numpy map + cv2.resize + cv2.remap takes, times ours with occlusion",
+        "half-size depth: numpy map + cv2.resize + cv2.remap",
+        "float32, occlusion, 640x480 depth",
+        ">= 3.5",
+    )
+    ratio(
+        "ours with occlusion takes, times cv2.remap with the map ready",
+        "float32, occlusion",
+        "cv2.remap, map ready",
+        "<= 0.95",
+    )
+    ratio(
+        "uint8: ours with occlusion takes, times cv2.remap with the map ready",
+        "uint8, occlusion",
+        "uint8: cv2.remap, map ready",
+        "<= 0.85",
+    )
+    ratio(
+        "colour takes, times gray, uint8, with occlusion",
+        "uint8, colour, occlusion",
+        "uint8, occlusion",
+        "<= 1.6",
     )
     ratio("float32 takes, times uint8", "float32", "uint8")
     ratio("one thread takes, times two", "float32", "float32, two threads")

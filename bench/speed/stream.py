@@ -1,7 +1,8 @@
 """`register` on many frames: frames a second, memory, where the time goes, what overlapping gains.
 
-Frames are written first, to a folder of PNG files or to videos. For the gain, short stretches are
-registered in turns, stage after stage on one thread and overlapped. Then all frames are registered
+Frames are written first, to a folder of PNG files or to videos, with depth of half their size. For
+the gain, short stretches are registered in turns, stage after stage on one thread, overlapped, and,
+of folders, by a plain loop of OpenCV calls. Then all frames are registered
 while memory and open descriptors are sampled; for what does not stay flat over 100,000 frames,
 `--kind video --frames 100000 --width 64`.
 """
@@ -10,12 +11,14 @@ import argparse
 import shutil
 import tempfile
 import threading
+import time
 from pathlib import Path
 
 import cv2
 import numpy as np
 from common import machine
 from figures import figure, spread
+from peers import plain_loop
 
 from xcalib import Rig, synthetic
 from xcalib.footage import Picked
@@ -71,7 +74,8 @@ def write(folder: Path, rig: Rig, count: int, kind: str) -> tuple[Path, Path]:
             for path, image in zip(streams, pair, strict=True):
                 write_image(path / f"{index:06d}.png", image)
         if index < SCENES:
-            done, data = cv2.imencode(".png", np.rint(256 * scene.depth).astype(np.uint16))
+            depth = cv2.resize(scene.depth, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_NEAREST)
+            done, data = cv2.imencode(".png", np.rint(256 * depth).astype(np.uint16))
             assert done
             encoded.append(data.tobytes())
         path = folder / "depth" / f"{index:06d}.png"
@@ -113,10 +117,19 @@ def main() -> None:
         frames = Frames.open(Inputs(*streams, folder / "depth"))
         print(f"{given.frames} frames {rig.reference.width}x{rig.reference.height}, {given.kind}")
 
+        images = sorted(streams[1].iterdir()) if given.kind == "folder" else []
+        maps = sorted((folder / "depth").iterdir())
+        plain: list[float] = []
         rates: dict[bool, list[float]] = {True: [], False: []}
         last: dict[bool, Registration] = {}
         for turn in range(ROUNDS):
-            few = stretch(frames, (turn * STRETCH) % max(1, len(frames) - STRETCH), STRETCH)
+            first = (turn * STRETCH) % max(1, len(frames) - STRETCH)
+            few = stretch(frames, first, STRETCH)
+            if images:
+                which = slice(first, first + STRETCH)
+                start = time.perf_counter()
+                plain_loop.run(rig, images[which], maps[which], folder / "plain", 1 / 256)
+                plain.append(STRETCH / (time.perf_counter() - start))
             for overlapped in (True, False) if turn % 2 else (False, True):
                 options = RegistrationOptions(0 if overlapped else 1, overwrite=True)
                 result = run_registration(few, rig, out, options, None, True)
@@ -127,6 +140,10 @@ def main() -> None:
             busy(label, last[overlapped])
         ratios = np.array(rates[True]) / np.array(rates[False])
         spread(f"overlapping gains, times, in {ROUNDS} turns of {STRETCH} frames", ratios)
+        if plain:
+            spread("plain loop of OpenCV calls: frames a second", plain)
+            label = "overlapped, times the plain loop"
+            spread(label, np.array(rates[True]) / np.array(plain), "", ">= 4")
         if out.is_dir():
             shutil.rmtree(out)
 

@@ -27,6 +27,7 @@ class Plane : public Depth {
         return picture_of(plane_(reference.view.width, reference.view.height));
     }
     bool concurrent() const override { return true; }
+    bool looks_at_reference() const override { return false; }
 
    private:
     PlaneDepth plane_;
@@ -48,6 +49,7 @@ class Files : public Depth {
         return depth;
     }
     bool concurrent() const override { return true; }
+    bool looks_at_reference() const override { return false; }
     std::vector<Path> files(int index) const override {
         return {paths_[static_cast<std::size_t>(index)]};
     }

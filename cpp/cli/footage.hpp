@@ -19,6 +19,7 @@ class ImageFiles : public Stream {
     Path file(int index) const override { return at(index); }
     std::vector<Path> paths() const override { return paths_; }
     bool concurrent() const override { return true; }
+    std::optional<HeaderSize> size_in_header(int index) override { return header_size(at(index)); }
 
    private:
     Picture read(int index) override { return picture_of(read_image(at(index))); }

@@ -43,6 +43,15 @@ class PythonStream : public Stream, public py::trampoline_self_life_support {
             return py::isinstance<py::bool_>(parallel) && parallel.cast<bool>();
         });
     }
+    std::optional<HeaderSize> size_in_header(int index) override {
+        // By a path where frames are files of their own: read without Python's lock.
+        const std::optional<Path> file = in_python([&]() -> std::optional<Path> {
+            const py::object of = py::getattr(self(), "header_file", py::none());
+            if (of.is_none()) return std::nullopt;
+            return of(index).template cast<Path>();
+        });
+        return file ? header_size(*file) : std::nullopt;
+    }
 
    private:
     py::object self() const {
@@ -90,7 +99,9 @@ void bind_stream(py::module_& m) {
 Only names and times are held, so that memory does not grow with the pixels of the footage. A slice
 is a stream again. A class of streams calls super().__init__() and has __len__, name(index),
 where(index) and read(index): frame 0 <= index < len, (H, W) or (H, W, 3), uint8, uint16 or float32;
-file(index) where that is not where(index); and parallel = True if several threads may read.)")
+file(index) where that is not where(index); header_file(index) too where a frame is an image file as
+it is stored, so that its size is known without decoding it; and parallel = True if several threads
+may read.)")
         .def(py::init<>())
         .def("__len__", &Stream::size)
         .def("__getitem__", &item_of)
@@ -120,6 +131,16 @@ file(index) where that is not where(index); and parallel = True if several threa
         "A half of every frame: two cameras side by side, or one above the other, in one stream.")
         .def(py::init<StreamPointer, std::string>(), py::arg("stream"), py::arg("half"),
              "half: left, right, top or bottom.");
+    m.def(
+        "header_size",
+        [](const Path& file) -> std::optional<std::pair<int, int>> {
+            const std::optional<HeaderSize> size = header_size(file);
+            if (!size) return std::nullopt;
+            return std::pair{size->width, size->height};
+        },
+        py::arg("file"),
+        "(width, height) of a PNG or JPEG file by its header; None of others, and where it is not "
+        "whole.");
     m.def("read_times", &read_times, py::arg("table"), py::arg("stream"), Unlocked(),
           "Seconds of the frames of a stream from a file of `name timestamp` lines, see "
           "times_of_table().");

@@ -30,8 +30,9 @@ class PythonDepth : public Depth {
    public:
     explicit PythonDepth(py::object provider)
         : concurrent_(provider.attr("is_parallel").cast<bool>()),
-          steadied_(provider.attr("is_steady").cast<bool>()), provider_(kept(std::move(provider))) {
-    }
+          steadied_(provider.attr("is_steady").cast<bool>()),
+          looks_(provider.attr("looks_at_reference").cast<bool>()),
+          provider_(kept(std::move(provider))) {}
 
     Picture operator()(int index, const Picture& reference) override {
         return in_python([&] {
@@ -45,9 +46,10 @@ class PythonDepth : public Depth {
     }
     bool concurrent() const override { return concurrent_; }
     bool steadied() const override { return steadied_; }
+    bool looks_at_reference() const override { return looks_; }
 
    private:
-    bool concurrent_, steadied_;
+    bool concurrent_, steadied_, looks_;
     Kept provider_;
 };
 

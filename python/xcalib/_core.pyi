@@ -1175,8 +1175,9 @@ class Stream:
     Only names and times are held, so that memory does not grow with the pixels of the
     footage. A slice is a stream again. A class of streams calls super().__init__() and has
     __len__, name(index), where(index) and read(index): frame 0 <= index < len, (H, W) or (H,
-    W, 3), uint8, uint16 or float32; file(index) where that is not where(index); and parallel
-    = True if several threads may read.
+    W, 3), uint8, uint16 or float32; file(index) where that is not where(index);
+    header_file(index) too where a frame is an image file as it is stored, so that its size is
+    known without decoding it; and parallel = True if several threads may read.
     """
     def __init__(self) -> None: ...
     def __len__(self) -> int: ...
@@ -1220,6 +1221,10 @@ def as_stored(file: bytes) -> bytes:
     """The bytes of an image file, of a TIFF as if it did not say how its picture is to be
     turned: OpenCV would do so, which it does with no other.
     """
+
+def header_size(file: str | PathLike[str]) -> tuple[int, int] | None:
+    """(width, height) of a PNG or JPEG file by its header; None of others, and where it is not
+    whole."""
 
 def read_times(table: str | PathLike[str], stream: Stream) -> list[float]:
     """Seconds of the frames of a stream from a file of `name timestamp` lines, see

@@ -33,6 +33,7 @@ from ._core import (
     overlay,
     pair_files,
 )
+from .png import encode_png
 
 Image = NDArray[Any]
 Size = tuple[int, int]
@@ -205,6 +206,9 @@ def write_bytes(path: str | Path, data: bytes) -> None:
 def encode_image(path: str | Path, image: Image) -> bytes:
     """An image file of the kind that the suffix of ``path`` says."""
     path = Path(path)
+    whole = image.dtype in (np.uint8, np.uint16) and image.shape[2:] in ((), (3,))
+    if path.suffix.lower() == ".png" and whole:
+        return encode_png(image)
     done, data = cv2.imencode(path.suffix, image)
     if not done:
         raise ValueError(f"{path}: cannot encode {image.shape} {image.dtype}")

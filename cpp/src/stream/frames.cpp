@@ -22,6 +22,7 @@ class PickedDepth : public Depth {
     }
     bool concurrent() const override { return depth_->concurrent(); }
     bool steadied() const override { return depth_->steadied(); }
+    bool looks_at_reference() const override { return depth_->looks_at_reference(); }
 
    private:
     int at(int index) const { return indices_[static_cast<std::size_t>(index)]; }

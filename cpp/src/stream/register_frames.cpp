@@ -18,7 +18,7 @@ namespace {
 
 // So many more frames are under way than are worked on: they wait for their turn where a stage
 // takes them in order, with what the stages before have done.
-constexpr int kWaiting = 2;
+constexpr int kWaiting = 4;
 
 std::string percentages(const BusyShares& busy) {
     std::string text;
@@ -183,6 +183,7 @@ Registration register_frames(const Frames& frames, const Rig& rig,
     std::vector<Passing> passing(static_cast<std::size_t>(threads));
     std::atomic<int> made{0};  // by this run, as `valid` is of it
     std::atomic<long> valid{0};
+    const bool looks = options.overlays || frames.depth->looks_at_reference();
     // A stage by what it does with a frame on its way; `in_order` unless several may.
     const auto stage = [&](const char* name, bool concurrent, auto work) {
         return Stage{name, !concurrent, [&, work](int place, int slot) {
@@ -191,7 +192,10 @@ Registration register_frames(const Frames& frames, const Rig& rig,
     };
     const std::vector<Stage> stages = {
         stage("decode", frames.references->concurrent(),
-              [&](Passing& p, int i) { p.frame.reference = (*frames.references)[i]; }),
+              [&](Passing& p, int i) {
+                  Stream& references = *frames.references;
+                  p.frame.reference = looks ? references[i] : references.outline(i);
+              }),
         stage("decode", frames.sources->concurrent(),
               [&](Passing& p, int i) {
                   if (missing[i]) p.frame.source = (*frames.sources)[i];

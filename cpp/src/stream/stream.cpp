@@ -51,21 +51,41 @@ StreamPointer inverted(StreamPointer stream, const ColorMap& map) {
 
 Picture Stream::operator[](int index) {
     Picture image = read(index);
+    require_one_size(index, image.view);
+    return image;
+}
+
+Picture Stream::outline(int index) {
+    const std::optional<HeaderSize> size = size_in_header(index);
+    if (!size) return (*this)[index];
+    ImageView view;
+    view.width = size->width;
+    view.height = size->height;
+    require_one_size(index, view);
+    const std::lock_guard lock(mutex_);
+    if (outline_.empty()) {
+        MutableImageView pixels;
+        outline_ = new_picture(view.width, view.height, 1, PixelType::u8, pixels);
+        std::memset(pixels.data, 0, pixels.row_bytes * static_cast<std::size_t>(view.height));
+    }
+    return outline_;
+}
+
+void Stream::require_one_size(int index, const ImageView& image) {
     ImageView first;
     {
         const std::lock_guard lock(mutex_);
         if (first_ < 0) {
             first_ = index;
-            first_size_.width = image.view.width;
-            first_size_.height = image.view.height;
+            first_size_.width = image.width;
+            first_size_.height = image.height;
         }
         first = first_size_;
     }
-    if (image.view.width != first.width || image.view.height != first.height)
-        throw InputError(where(index) + " is " + size_text(image.view) + ", expected " +
+    if (image.width != first.width || image.height != first.height)
+        throw InputError(where(index) + " is " + size_text(image) + ", expected " +
                          size_text(first) + " as " +
                          std::filesystem::path(where(first_)).filename().string());
-    return image;
 }
 
 FrameList Stream::frames() const {

@@ -25,6 +25,7 @@ class FolderDepth(DepthProvider):
     """Depth maps of a folder, one per reference image, paired with them by `frames.pair`."""
 
     is_parallel = True
+    looks_at_reference = False
 
     def __init__(
         self, folder: str | Path, reference_paths: Sequence[Path], scale: float = PNG_SCALE

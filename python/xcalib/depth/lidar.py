@@ -97,6 +97,7 @@ class LidarDepth(DepthProvider):
     """
 
     is_parallel = True
+    looks_at_reference = False
 
     def __init__(
         self, folder: str | Path, reference_paths: Sequence[Path], calibration: str | Path

@@ -14,6 +14,7 @@ class PlaneDepth(_core.PlaneDepth, DepthProvider):
     """A flat road under the camera, all else far away: see the core's class."""
 
     is_parallel = True
+    looks_at_reference = False
 
     def fitted(
         self,

@@ -44,6 +44,11 @@ class DepthProvider:
         return False
 
     @property
+    def looks_at_reference(self) -> bool:
+        """Whether depth depends on the reference's pixels; where not, they may be 0."""
+        return True
+
+    @property
     def relative(self) -> NetworkDepth | None:
         """The network whose scale and shift have to be estimated; None where depth is in metres."""
         return None

@@ -29,6 +29,8 @@ class TopicDepth(DepthProvider):
         Images ``(h, w)``, float32 or uint16, 0 or NaN where depth is unknown.
     """
 
+    looks_at_reference = False
+
     def __init__(self, stream: Stream) -> None:
         self.stream = stream
 

@@ -57,6 +57,10 @@ class ImageFiles(Stream):
     def file(self, index: int) -> Path:
         return self.paths[index]
 
+    def header_file(self, index: int) -> Path:
+        """The file whose header says the frame's size."""
+        return self.paths[index]
+
 
 def matching_files(pattern: Path) -> list[Path]:
     """Image files of a pattern with ``*``, ``?``, ``[...]``, or a number as in ``%06d``."""

@@ -53,6 +53,10 @@ class PickedDepth(WrappedDepth):
     def __call__(self, index: int, reference: Image) -> Depth:
         return self.provider(self.indices[index], reference)
 
+    @property
+    def looks_at_reference(self) -> bool:
+        return self.provider.looks_at_reference
+
     def files_of(self, index: int) -> list[Path]:
         return self.provider.files_of(self.indices[index])
 

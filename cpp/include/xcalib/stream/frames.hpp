@@ -25,6 +25,8 @@ class Depth {
     virtual bool concurrent() const { return false; }  // may several threads ask, in any order?
     // Whether a frame's depth is made of those before it too.
     virtual bool steadied() const { return false; }
+    // Does it depend on the reference's pixels, or on its size alone?
+    virtual bool looks_at_reference() const { return true; }
 };
 
 using DepthPointer = std::shared_ptr<Depth>;

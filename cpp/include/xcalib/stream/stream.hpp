@@ -12,6 +12,7 @@
 
 #include "xcalib/export.hpp"
 #include "xcalib/footage/pairing.hpp"
+#include "xcalib/stream/header.hpp"
 #include "xcalib/stream/picture.hpp"
 
 namespace XCALIB_EXPORT xcalib {
@@ -37,15 +38,22 @@ class Stream {
     // Frame `index`, 0 <= index < size(); throws InputError where it is not of the size of the
     // others, DecodeError where it cannot be decoded.
     Picture operator[](int index);
+    // A picture of its size, for those who do not look at its pixels, which are 0: where a header
+    // tells the size, nothing is decoded, and what is corrupt behind it is not found.
+    Picture outline(int index);
+    // The size of the frame where it is known without decoding it.
+    virtual std::optional<HeaderSize> size_in_header(int) { return std::nullopt; }
 
     FrameList frames() const;
 
    private:
     virtual Picture read(int index) = 0;
+    void require_one_size(int index, const ImageView& image);
 
     std::mutex mutex_;
     int first_ = -1;        // the frame read first
     ImageView first_size_;  // of which only the size is known
+    Picture outline_;       // of all of them
 };
 
 using StreamPointer = std::shared_ptr<Stream>;
@@ -59,6 +67,9 @@ class Picked : public Stream {
     std::string where(int index) const override { return stream_->where(at(index)); }
     std::filesystem::path file(int index) const override { return stream_->file(at(index)); }
     bool concurrent() const override { return stream_->concurrent(); }
+    std::optional<HeaderSize> size_in_header(int index) override {
+        return stream_->size_in_header(at(index));
+    }
 
    private:
     Picture read(int index) override { return (*stream_)[at(index)]; }
