@@ -35,6 +35,7 @@ void run(RegisterArguments a, Console& console) {
     } else {
         if (a.depth_fd >= 0) throw InputError("--depth-fd goes with --live");
         const Frames frames = open_frames(a.frames, rig, console);
+        if (a.frames.dry_run) return say_plan(frames, {a.output}, {}, console);
         totals = register_files(a, frames, rig, console);
     }
     const double share = totals.pixels ? static_cast<double>(totals.valid) / totals.pixels : 0.0;
@@ -108,6 +109,7 @@ void add_register(CLI::App& app, Console& console) {
         ->needs(live)
         ->capture_default_str();
     command->add_flag("--quiet", console.quiet, "No progress.");
+    add_rare_depth(*command, a.frames.depth);
     command->fallthrough();
     command->callback([arguments, &console] { run(*arguments, console); });
 }

@@ -30,9 +30,11 @@ if TYPE_CHECKING:
         fit_lags,
     )
     from xcalib.choose import choose_frames
+    from xcalib.evaluation import evaluate
 
     __version__: str
 else:
+    IN_PYTHON = {"choose_frames": "choose", "evaluate": "evaluation"}
 
     def __getattr__(name: str) -> Any:
         """Import what a name stands for when it is first used: `xcalib --version` needs nothing."""
@@ -40,8 +42,8 @@ else:
             value = import_module("importlib.metadata").version("xcalib-rgbt")
         elif name == "metrics":
             value = import_module("xcalib.metrics")
-        elif name == "choose_frames":
-            value = import_module("xcalib.choose").choose_frames
+        elif name in IN_PYTHON:
+            value = getattr(import_module(f"xcalib.{IN_PYTHON[name]}"), name)
         elif name in __all__:
             value = getattr(import_module("xcalib._core"), name)
         else:
@@ -71,6 +73,7 @@ __all__ = [
     "SearchOptions",
     "calibrate",
     "choose_frames",
+    "evaluate",
     "fit_lags",
     "metrics",
 ]

@@ -14,7 +14,8 @@ from . import metrics, synthetic
 from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig
 from .frames import Image, check_folder_writable, display_gray, overlay, size_of, write_image
 from .inputs import Inputs
-from .pipeline import Frames, progress, run_calibration, save_rig
+from .pipeline import Frames, run_calibration, save_rig
+from .progress import progress
 from .registration import RegistrationOptions, run_registration
 
 
@@ -91,7 +92,7 @@ def before_and_after(frames: Frames, rig: Rig) -> tuple[Image, Image]:
     registered, mask = Registrar(frames.fit(rig)).register(source, depth)
     resized = cv2.resize(source, size_of(reference), interpolation=cv2.INTER_AREA)
     before = [colour(reference), colour(resized), overlay(reference, resized)]
-    after = [colour(reference), colour(registered), overlay(reference, registered, mask == 0)]
+    after = [colour(reference), colour(registered), overlay(reference, registered, mask)]
     return np.hstack(before), np.hstack(after)
 
 

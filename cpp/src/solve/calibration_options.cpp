@@ -18,6 +18,30 @@ void require(bool ok, const char* field, double value, const char* expected) {
 
 }  // namespace
 
+void SearchOptions::validate() const {
+    require(max_fov_ratio > 1 && max_fov_ratio <= 10, "search.max_fov_ratio", max_fov_ratio,
+            "a ratio in (1, 10]");
+    require(max_roll_deg >= 0 && max_roll_deg <= 180, "search.max_roll_deg", max_roll_deg,
+            "an angle in [0, 180] deg");
+    require(min_overlap > 0 && min_overlap < 1, "search.min_overlap", min_overlap,
+            "a share in (0, 1)");
+    require(map_width >= 32, "search.map_width", map_width, "at least 32 px");
+    require(candidates >= 1, "search.candidates", candidates, "at least 1");
+}
+
+void AdamOptions::validate() const {
+    require(epochs >= 1, "adam.epochs", epochs, "at least 1");
+    require(batch >= 1, "adam.batch", batch, "at least 1");
+    require(learning_rate > 0 && std::isfinite(learning_rate), "adam.learning_rate", learning_rate,
+            "a finite number > 0");
+    require(fine_learning_rate > 0 && std::isfinite(fine_learning_rate), "adam.fine_learning_rate",
+            fine_learning_rate, "a finite number > 0");
+    require(decay > 0 && decay <= 1, "adam.decay", decay, "a factor in (0, 1]");
+    require(fine_from >= 0 && fine_from <= 1, "adam.fine_from", fine_from, "a share in [0, 1]");
+    require(translation_scales >= 1 && translation_scales <= 3, "adam.translation_scales",
+            translation_scales, "1 to 3");
+}
+
 void CalibrationOptions::validate() const {
     require(max_frames >= 1, "max_frames", max_frames, "at least 1");
     require(num_threads >= 0 && num_threads <= kMaxThreads, "num_threads", num_threads,
@@ -36,30 +60,13 @@ void CalibrationOptions::validate() const {
     if (source_camera) source_camera->validate("options: source_camera");
     if (reference_lens) reference_lens->validate("options: reference_lens");
     if (source_lens) source_lens->validate("options: source_lens");
-    require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
-            search.max_fov_ratio, "a ratio in (1, 10]");
-    require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",
-            search.max_roll_deg, "an angle in [0, 180] deg");
-    require(search.min_overlap > 0 && search.min_overlap < 1, "search.min_overlap",
-            search.min_overlap, "a share in (0, 1)");
-    require(search.map_width >= 32, "search.map_width", search.map_width, "at least 32 px");
-    require(search.candidates >= 1, "search.candidates", search.candidates, "at least 1");
+    search.validate();
     if (relative_depth) relative_depth->validate("options: relative_depth");
     if (solver != Solver::adam) return;
     if (search.mode == SearchMode::full || search.mode == SearchMode::local)
         throw std::invalid_argument(
             "options: solver = adam searches nothing, expected search.mode = automatic or off");
-    require(adam.epochs >= 1, "adam.epochs", adam.epochs, "at least 1");
-    require(adam.batch >= 1, "adam.batch", adam.batch, "at least 1");
-    require(adam.learning_rate > 0 && std::isfinite(adam.learning_rate), "adam.learning_rate",
-            adam.learning_rate, "a finite number > 0");
-    require(adam.fine_learning_rate > 0 && std::isfinite(adam.fine_learning_rate),
-            "adam.fine_learning_rate", adam.fine_learning_rate, "a finite number > 0");
-    require(adam.decay > 0 && adam.decay <= 1, "adam.decay", adam.decay, "a factor in (0, 1]");
-    require(adam.fine_from >= 0 && adam.fine_from <= 1, "adam.fine_from", adam.fine_from,
-            "a share in [0, 1]");
-    require(adam.translation_scales >= 1 && adam.translation_scales <= 3, "adam.translation_scales",
-            adam.translation_scales, "1 to 3");
+    adam.validate();
 }
 
 }  // namespace xcalib

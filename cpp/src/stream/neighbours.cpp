@@ -78,7 +78,13 @@ void add_lags(const LagReport& lag, const TimeOffset& offset, const Stream& all_
             "part of the footage";
     else
         late += "try " + option_for_lag(offset, lag.frames, clock_of(all_sources.frames()).value());
-    report.message = report.converged ? late : report.message + "; " + late;
+    distrust(late, result);
+}
+
+void distrust(const std::string& line, CalibrationResult& result) {
+    if (line.empty()) return;
+    CalibrationReport& report = result.report;
+    report.message = report.converged ? line : report.message + "; " + line;
     report.converged = result.converged = false;
 }
 

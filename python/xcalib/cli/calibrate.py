@@ -14,6 +14,7 @@ from .._core import (
     Lens,
     Pinhole,
     _flow_arguments,
+    draw_frames,
     left_out,
     report_document,
 )
@@ -31,12 +32,14 @@ from .arguments import (
     frames_arguments,
     load_rig,
     open_frames,
+    print_plan,
     quiet_option,
     threads_option,
     with_scalar_sources,
 )
 from .errors import NOT_TRUSTED, stop, warn
 from .options import Input, Output
+from .sections import Sectioned
 
 LAG_ROUNDS = 2
 """Times at most that a lag is taken up, each of some frames."""
@@ -81,7 +84,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     return "on", NetworkFlow(spec)
 
 
-@click.command("calibrate")
+@click.command("calibrate", cls=Sectioned)
 @frames_arguments
 @click.option(
     "-o",
@@ -248,6 +251,7 @@ def command(
     refine_plane: bool,
     report_file: Path | None,
     quiet: bool,
+    dry_run: bool,
     **inputs: Any,
 ) -> None:
     """Estimate both cameras and their pose, and write a rig file.
@@ -320,6 +324,10 @@ def command(
                 raise InputError(f"none of {len(choice.candidates)} frames can be used; {why}")
             warn(left_out(len(choice.unusable), why))
         indices = choice.indices
+    if dry_run:
+        used = draw_frames(len(frames), max_frames, seed) if indices is None else indices
+        print_plan(frames, [output, report_file], used)
+        return
     result, chosen = run_calibration(
         frames, calibration, initial_rig, quiet, set_cameras, indices, warn, flow
     )

@@ -25,6 +25,8 @@ class Depth {
     virtual bool concurrent() const { return false; }  // may several threads ask, in any order?
     // Whether a frame's depth is made of those before it too.
     virtual bool steadied() const { return false; }
+    // For the user: what its numbers are taken for, in a line, or nothing.
+    virtual std::string line() const { return ""; }
 };
 
 using DepthPointer = std::shared_ptr<Depth>;
