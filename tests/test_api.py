@@ -266,14 +266,23 @@ def test_options_of_the_wrong_type_are_errors() -> None:
         ({"working_width": 3}, "working_width = 3"),
         ({"prior_weight": -1.5}, "prior_weight = -1.5"),
         ({"reference_hfov_deg": 200.0}, "reference_hfov_deg = 200"),
-        ({"search": SearchOptions(min_overlap=0.0)}, "search.min_overlap = 0"),
-        ({"search": SearchOptions(candidates=0)}, "search.candidates = 0"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_validation_names_field_value_and_range(changed: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=f"{message}.*expected|{message}"):
-        CalibrationOptions(**changed).validate()
+def test_values_are_checked_when_they_are_set(changed: dict[str, Any], message: str) -> None:
+    options = CalibrationOptions()
+    for name, value in changed.items():
+        with pytest.raises(ValueError, match=message):
+            CalibrationOptions(**changed)
+        with pytest.raises(ValueError, match=message):
+            setattr(options, name, value)
+    assert options == CalibrationOptions()
+
+
+def test_values_of_the_search_are_checked() -> None:
+    for name, value in (("min_overlap", 0.0), ("candidates", 0)):
+        with pytest.raises(ValueError, match=f"search.{name} = 0, expected"):
+            SearchOptions(**{name: value})
 
 
 def test_draw_frames() -> None:

@@ -6,6 +6,7 @@
 #include "footage.hpp"
 #include "open_frames.hpp"
 #include "xcalib/judge/documents.hpp"
+#include "xcalib/stream/files.hpp"
 #include "xcalib/stream/outputs.hpp"
 
 namespace xcalib::cli {
@@ -56,6 +57,7 @@ void run(const Arguments& a, bool has_json, Console& console) {
         console.progress("evaluating", static_cast<double>(index + 1) / frames.size());
     }
     const Evaluation result = evaluator.result();
+    say_depth(frames, console);
     console.line(result.table());
     const std::string document = evaluation_document(result, a.rig, files);
     if (has_json) write_file(a.json_file, document);

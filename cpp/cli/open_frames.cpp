@@ -1,5 +1,7 @@
 #include "open_frames.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include "depth.hpp"
 #include "footage.hpp"
 #include "xcalib/rig_file.hpp"
@@ -35,7 +37,6 @@ Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& ri
     if (rig) pairs.refine(*rig, open);
     const DepthPointer depth = open(pairs.pairing().references);
     for (const std::string& note : pairs.notes()) console.note(note);
-    if (const std::string line = depth->line(); !line.empty()) console.note(line);
     if (rig && rig->relative_depth)
         console.note(
             "the rig was calibrated with relative depth: metres do not fit its translation");
@@ -51,8 +52,16 @@ Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& 
     return frames;
 }
 
+void say_depth(const Frames& frames, Console& console) {
+    const std::string line = frames.depth->line();
+    if (line.empty()) return;
+    console.line(line);
+    console.event("note", {{"message", line}});
+}
+
 void say_plan(const Frames& frames, const std::vector<std::string>& outputs,
               const std::vector<int>& chosen, Console& console) {
+    say_depth(frames, console);
     console.line(plan_text(frames, chosen));
     for (const std::string& output : outputs)
         if (!output.empty()) console.line("would be written: " + output);

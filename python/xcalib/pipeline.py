@@ -56,6 +56,8 @@ class Frames:
     """Of the references, in all sources."""
     offset: TimeOffset | None = None
     """That they were paired with."""
+    depth_line: str = ""
+    """What the numbers of the depth maps were taken for, in a line, or ''."""
 
     @staticmethod
     def open(inputs: Inputs, rig: Rig | None = None) -> Frames:
@@ -86,7 +88,7 @@ class Frames:
         applied = inputs.matching.exif_orientation == "apply"
         opened = [orientation_line(stream, applied) for stream in streams] + [clock_line(*streams)]
         note = misfit(depth, rig) if rig is not None else ""
-        notes = tuple(line for line in (*opened, *pairs.notes, depth.line(), note) if line)
+        notes = tuple(line for line in (*opened, *pairs.notes, note) if line)
         partners = tuple(pairs.pairing.sources.tolist())
         return Frames(
             pairs.references,
@@ -96,6 +98,7 @@ class Frames:
             pairs.all_sources,
             partners,
             pairs.offset,
+            depth.line(),
         )
 
     def __len__(self) -> int:

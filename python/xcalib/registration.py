@@ -5,6 +5,7 @@ What is written is noted in a journal; frames that it lists are not made again.
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -76,7 +77,7 @@ def run_registration(
         SIGINT or SIGTERM; what is written is whole, and the same call resumes from there.
     """
     options = options or RegistrationOptions()
-    with Progress(len(frames), quiet) as progress:
+    with Progress(len(frames), quiet, frames.depth_line) as progress:
         return register_frames(
             frames.references,
             frames.sources,
@@ -112,9 +113,10 @@ def described(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 class Progress:
-    """A bar on stderr; where that is no terminal, a line now and then."""
+    """A bar on stderr; where that is no terminal, a line now and then; and a note once."""
 
-    def __init__(self, total: int, quiet: bool) -> None:
+    def __init__(self, total: int, quiet: bool, note: str) -> None:
+        self._note = note
         self._lines = Lines(quiet)
         self._bar = tqdm(
             total=total,
@@ -132,7 +134,10 @@ class Progress:
         self._bar.close()
 
     def __call__(self, now: Registration) -> None:
-        """Show how far it is."""
+        """Show how far it is; with the first frame, the note."""
+        if self._note and now.made:
+            tqdm.write(self._note, file=sys.stdout)
+            self._note = ""
         if not self._bar.disable:
             busy = ", ".join(f"{name} {100 * share:.0f} %" for name, share in now.busy.items())
             self._bar.set_postfix_str(busy, refresh=False)

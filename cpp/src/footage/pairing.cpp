@@ -301,7 +301,7 @@ Pairing pair_names(const std::vector<path>& first, const std::vector<path>& seco
     }
     // A few that are alone are frames that one camera lost; many, that the names mean something
     // else.
-    constexpr double kLeastPaired = 0.75;
+    constexpr double kLeastPaired = 0.9;
     const double most = static_cast<double>(std::max(first.size(), second.size()));
     if (static_cast<double>(found.first.size()) < kLeastPaired * most)
         throw InputError(counts_of(first, second) + " do not pair: without a partner " +

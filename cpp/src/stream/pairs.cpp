@@ -29,7 +29,7 @@ void require_times(const Stream& references, const Stream& sources) {
 // One camera cannot be registered to itself.
 void expect_two(const Stream& references, const Stream& sources) {
     if (references.size() == 0 || sources.size() == 0) return;
-    if (references.where(0) == sources.where(0))
+    if (references.where(0) == sources.where(0) && std::filesystem::exists(references.file(0)))
         throw InputError(references.where(0) +
                          ": REFERENCE and SOURCE are the same frames; expected those of two"
                          " cameras (#left and #right take the halves of wide frames, #top and"

@@ -163,8 +163,15 @@ def with_scalar_sources(frames: Frames, colormap: str) -> Frames:
     return frames
 
 
+def say_depth(frames: Frames) -> None:
+    """What the numbers of the depth maps were taken for, once it is known that they will do."""
+    if frames.depth_line:
+        click.echo(frames.depth_line)
+
+
 def print_plan(frames: Frames, outputs: Sequence[Path | None], chosen: Sequence[int] = ()) -> None:
     """What a run would read, pair, choose and write."""
+    say_depth(frames)
     click.echo(plan_text(frames.references, frames.sources, frames.depth, list(chosen)))
     for path in outputs:
         if path is not None:

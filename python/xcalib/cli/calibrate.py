@@ -34,6 +34,7 @@ from .arguments import (
     open_frames,
     print_plan,
     quiet_option,
+    say_depth,
     threads_option,
     with_scalar_sources,
 )
@@ -346,6 +347,7 @@ def command(
         result, chosen = run_calibration(
             frames, calibration, initial_rig, quiet, set_cameras, chosen, warn, flow
         )
+    say_depth(frames)
     save_rig(result.rig, output)
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")

@@ -22,6 +22,7 @@ from .arguments import (
     print_plan,
     quiet_option,
     rig_argument,
+    say_depth,
     threads_option,
     with_scalar_sources,
 )
@@ -88,6 +89,7 @@ def command(
         threads,
         None if registered is None else given_images(registered, frames),
     )
+    say_depth(frames)
     click.echo(result.table())
     if json_file is not None:
         names = [frames.references.where(index) for index in range(len(frames))]

@@ -74,7 +74,7 @@ Pairing pair_times(const std::vector<double>& references, const std::vector<doub
                    double offset = 0.0, std::optional<double> max_gap = std::nullopt);
 
 // Files of two cameras by their names, as pair_files() does, but for a few that are alone: these
-// are left out. Throws InputError where more than a quarter are.
+// are left out. Throws InputError where more than a tenth are.
 Pairing pair_names(const std::vector<std::filesystem::path>& first,
                    const std::vector<std::filesystem::path>& second);
 
