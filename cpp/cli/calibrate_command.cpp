@@ -240,7 +240,6 @@ void run(Arguments a, bool has_report, Console& console) {
     distrust(joined_line(loaded.views(&Frame::reference), "REFERENCE"), result);
     distrust(joined_line(loaded.views(&Frame::source), "SOURCE"), result);
     look_at_lags(frames, loaded, options, initial, console, result);
-    say_depth(frames, console);
     const Path output(a.output);
     if (output.has_parent_path()) std::filesystem::create_directories(output.parent_path());
     save_rig(result.rig, a.output);
@@ -253,6 +252,7 @@ void run(Arguments a, bool has_report, Console& console) {
         write_file(a.report, document);
         console.line("report: " + a.report);
     }
+    say_depth(*frames.depth, console);
     console.result(Json::parse(document));
     if (!result.converged) throw NotTrusted(result.report.message);
 }

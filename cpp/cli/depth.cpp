@@ -177,7 +177,7 @@ Picture read_numbers(const Path& file) {
     if (depth == CV_64F || depth == CV_16F) values.convertTo(values, CV_32F);
     if (values.depth() != CV_16U && values.depth() != CV_32F)
         throw InputError(file.string() + ": depth is " + type_name(depth) +
-                         ", expected floats in metres, or uint16 and its unit");
+                         ", expected floats in metres");
     return picture_of(values);
 }
 

@@ -57,8 +57,8 @@ void run(const Arguments& a, bool has_json, Console& console) {
         console.progress("evaluating", static_cast<double>(index + 1) / frames.size());
     }
     const Evaluation result = evaluator.result();
-    say_depth(frames, console);
     console.line(result.table());
+    say_depth(*frames.depth, console);
     const std::string document = evaluation_document(result, a.rig, files);
     if (has_json) write_file(a.json_file, document);
     console.result(Json::parse(document));

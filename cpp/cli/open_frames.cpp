@@ -52,8 +52,8 @@ Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& 
     return frames;
 }
 
-void say_depth(const Frames& frames, Console& console) {
-    const std::string line = frames.depth->line();
+void say_depth(const Depth& depth, Console& console) {
+    const std::string line = depth.line();
     if (line.empty()) return;
     console.line(line);
     console.event("note", {{"message", line}});
@@ -61,8 +61,8 @@ void say_depth(const Frames& frames, Console& console) {
 
 void say_plan(const Frames& frames, const std::vector<std::string>& outputs,
               const std::vector<int>& chosen, Console& console) {
-    say_depth(frames, console);
     console.line(plan_text(frames, chosen));
+    say_depth(*frames.depth, console);
     for (const std::string& output : outputs)
         if (!output.empty()) console.line("would be written: " + output);
 }

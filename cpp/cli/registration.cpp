@@ -3,7 +3,6 @@
 #include <charconv>
 
 #include "encoder.hpp"
-#include "open_frames.hpp"
 #include "xcalib/footage/fingerprint.hpp"
 #include "xcalib/stream/files.hpp"
 
@@ -77,15 +76,10 @@ MadeWith inputs_of(const FrameArguments& frames) {
 Registration register_files(const RegisterArguments& arguments, const Frames& frames,
                             const Rig& rig, Console& console) {
     FfmpegCodecs codecs;
-    bool said = false;
     return register_frames(
         frames, rig, arguments.output, arguments.options, "xcalib-cli", inputs_of(arguments.frames),
         {arguments.rig, arguments.frames.reference_times, arguments.frames.source_times}, codecs,
         [&](const Registration& now) {
-            if (!said && now.made > 0) {
-                said = true;
-                say_depth(frames, console);
-            }
             console.show("registering", static_cast<double>(now.earlier + now.made) / now.frames,
                          now.line());
         });

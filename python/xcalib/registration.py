@@ -5,7 +5,6 @@ What is written is noted in a journal; frames that it lists are not made again.
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -77,7 +76,7 @@ def run_registration(
         SIGINT or SIGTERM; what is written is whole, and the same call resumes from there.
     """
     options = options or RegistrationOptions()
-    with Progress(len(frames), quiet, frames.depth_line) as progress:
+    with Progress(len(frames), quiet) as progress:
         return register_frames(
             frames.references,
             frames.sources,
@@ -113,10 +112,9 @@ def described(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 class Progress:
-    """A bar on stderr; where that is no terminal, a line now and then; and a note once."""
+    """A bar on stderr; where that is no terminal, a line now and then."""
 
-    def __init__(self, total: int, quiet: bool, note: str) -> None:
-        self._note = note
+    def __init__(self, total: int, quiet: bool) -> None:
         self._lines = Lines(quiet)
         self._bar = tqdm(
             total=total,
@@ -134,10 +132,7 @@ class Progress:
         self._bar.close()
 
     def __call__(self, now: Registration) -> None:
-        """Show how far it is; with the first frame, the note."""
-        if self._note and now.made:
-            tqdm.write(self._note, file=sys.stdout)
-            self._note = ""
+        """Show how far it is."""
         if not self._bar.disable:
             busy = ", ".join(f"{name} {100 * share:.0f} %" for name, share in now.busy.items())
             self._bar.set_postfix_str(busy, refresh=False)

@@ -171,8 +171,8 @@ def say_depth(frames: Frames) -> None:
 
 def print_plan(frames: Frames, outputs: Sequence[Path | None], chosen: Sequence[int] = ()) -> None:
     """What a run would read, pair, choose and write."""
-    say_depth(frames)
     click.echo(plan_text(frames.references, frames.sources, frames.depth, list(chosen)))
+    say_depth(frames)
     for path in outputs:
         if path is not None:
             click.echo(f"would be written: {path}")

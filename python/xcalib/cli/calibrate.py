@@ -347,7 +347,6 @@ def command(
         result, chosen = run_calibration(
             frames, calibration, initial_rig, quiet, set_cameras, chosen, warn, flow
         )
-    say_depth(frames)
     save_rig(result.rig, output)
     click.echo(result.report.brief())
     click.echo(f"rig: {output}")
@@ -355,5 +354,6 @@ def command(
         files = [frames.references.where(index) for index in chosen]
         write_bytes(report_file, report_document(result.report, str(output), files).encode())
         click.echo(f"report: {report_file}")
+    say_depth(frames)
     if not result.converged:
         stop(NOT_TRUSTED, result.report.message)

@@ -89,8 +89,8 @@ def command(
         threads,
         None if registered is None else given_images(registered, frames),
     )
-    say_depth(frames)
     click.echo(result.table())
+    say_depth(frames)
     if json_file is not None:
         names = [frames.references.where(index) for index in range(len(frames))]
         write_bytes(json_file, evaluation_document(result, str(rig_file), names).encode())

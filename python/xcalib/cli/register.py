@@ -18,6 +18,7 @@ from .arguments import (
     print_plan,
     quiet_option,
     rig_argument,
+    say_depth,
     threads_option,
 )
 from .errors import NOT_TRUSTED, stop
@@ -88,5 +89,6 @@ def command(
     reads = [rig_file, *given_files(inputs)]
     total = run_registration(frames, rig, output, how, inputs, quiet, reads)
     click.echo(f"{total.summary()}: {output}")
+    say_depth(frames)
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")

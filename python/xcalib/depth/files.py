@@ -87,9 +87,7 @@ def read_numbers(path: Path) -> NDArray[Any]:
     if np.issubdtype(values.dtype, np.floating):
         return values.astype(np.float32)
     if values.dtype != np.uint16:
-        raise InputError(
-            f"{path}: depth is {values.dtype}, expected floats in metres, or uint16 and its unit"
-        )
+        raise InputError(f"{path}: depth is {values.dtype}, expected floats in metres")
     return values
 
 
