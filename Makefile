@@ -19,7 +19,7 @@ export CCACHE_NOHASHDIR := 1
 export CXX
 
 BUILD_PACKAGES := ccache cmake g++ libceres-dev libeigen3-dev libhwy-dev libopencv-dev libyaml-cpp-dev make \
-    ninja-build nlohmann-json3-dev python3-dev python3-venv
+    ninja-build nlohmann-json3-dev python3-dev python3-venv zlib1g-dev
 # What xcalib-cli needs besides.
 CLI_PACKAGES := libavcodec-dev libavformat-dev libavutil-dev libcli11-dev libswscale-dev pkg-config
 TEST_PACKAGES := clang-format libgtest-dev pkg-config

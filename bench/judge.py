@@ -25,6 +25,11 @@ class View:
     inside: np.ndarray
     """Nonzero where a pixel is judged."""
 
+    @property
+    def mask(self) -> np.ndarray:
+        """The same as a registrar's mask."""
+        return np.where(self.inside, 0, 1).astype(np.uint8)
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -68,9 +73,12 @@ def scored(view: View, epe: np.ndarray | None = None) -> Judged:
         empty = np.empty((0, 2), np.float32)
         return Judged(whole, nothing, metrics.PatchResidual(empty, empty), 0.0, whole, epe)
     return Judged(
-        {name: score(view.reference, plain, inside) for name, score in METRICS.items()},
-        {name: score(view.reference, view.registered, inside) for name, score in METRICS.items()},
-        metrics.patch_residual(view.reference, view.registered, inside),
+        {name: score(view.reference, plain, view.mask) for name, score in METRICS.items()},
+        {
+            name: score(view.reference, view.registered, view.mask)
+            for name, score in METRICS.items()
+        },
+        metrics.patch_residual(view.reference, view.registered, view.mask),
         float(inside.mean()),
         whole,
         epe,

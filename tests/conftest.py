@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import signal
@@ -14,7 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from drive import write_drive
-from xcalib import Rig, synthetic
+from xcalib import Rig, progress, synthetic
 from xcalib.cli import cli as python_command
 
 # A shell lets its background jobs, and all that they start, ignore SIGINT.
@@ -43,6 +44,12 @@ def small(rig: Rig) -> Rig:
             for side in (camera.width, camera.height)
         )
     )
+
+
+@pytest.fixture(autouse=True)
+def no_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine they would come between what tests expect on stderr."""
+    monkeypatch.setattr(progress, "EVERY", math.inf)
 
 
 @pytest.fixture(scope="session")

@@ -220,7 +220,7 @@ def test_the_peer_has_our_metric(
     valid = mask == 0
     assert np.mean(seen.numpy()[0, 0] != valid) < 1e-3
     assert np.abs(warped.numpy()[0, 0] - image)[valid].max() < 1e-3
-    ours = xcalib.metrics.nec(peer.gray(frame.reference), image, valid, floor=floor)
+    ours = xcalib.metrics.nec(peer.gray(frame.reference), image, mask, floor=floor)
     theirs = peer.nec_terms(frames.references, warped, seen, floor)[0].item()
     assert theirs == pytest.approx(ours, abs=1e-3)
     if floor == "none":

@@ -277,5 +277,5 @@ def test_overlay_is_red_where_only_the_reference_is_bright() -> None:
     blue, green, red = picture[-1, 2]
     assert blue == green > 200 and red == 0
     # What is not valid is no difference: the reference is shown there, in gray.
-    picture = overlay(left, right, np.zeros(left.shape, bool))
+    picture = overlay(left, right, np.full(left.shape, 3, np.uint8))
     assert (picture == picture[..., 2:]).all()

@@ -40,9 +40,32 @@ def test_the_wheel_holds_the_package_and_nothing_else() -> None:
     assert {"py.typed", "_core.pyi"} <= inside
     info = next(path.parts[0] for path in installed if path.name == "METADATA")
     tops = {path.parts[0] for path in installed}
-    assert tops == {"xcalib", info, ".."}  # .. leads to the environment's bin/xcalib
+    assert tops == {"xcalib", "xcalib_rgbt", info, ".."}  # .. leads to the environment's bin/xcalib
     licences = {path.name for path in installed if "licenses" in path.parts}
     assert licences == {"LICENSE", "README.md"}
+
+
+def test_the_command_says_that_the_package_is_anothers(tmp_path: Path) -> None:
+    (tmp_path / "xcalib.py").write_text("")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import xcalib_rgbt"
+    run = subprocess.run(
+        [sys.executable, "-c", f"{code}; xcalib_rgbt.main()"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert run.returncode == 2 and run.stderr.count("\n") == 1
+    assert str(tmp_path / "xcalib.py") in run.stderr and "not that of xcalib-rgbt" in run.stderr
+
+
+def test_the_command_has_three_names() -> None:
+    beside = Path(sys.executable).parent
+    commands = ([sys.executable, "-m", "xcalib"], [beside / "xcalib"], [beside / "xcalib-rgbt"])
+    said = {
+        subprocess.run([*command, "--version"], capture_output=True, text=True, check=True).stdout
+        for command in commands
+    }
+    assert len(said) == 1 and "xcalib" in said.pop()
 
 
 def test_what_is_not_used_is_not_imported() -> None:

@@ -23,7 +23,7 @@ from click.testing import Result
 
 from conftest import FRAMES, run
 from drive import COPIES, arguments, contents, files_below, same_frames
-from xcalib import Rig, registration
+from xcalib import Rig, progress, registration
 from xcalib.depth import FolderDepth
 from xcalib.footage import ImageFiles, Stream, encoder, open_stream
 from xcalib.footage.opening import PickedDepth
@@ -105,7 +105,7 @@ def test_the_summary_tells_where_the_time_goes(drive: Path, tmp_path: Path) -> N
 def test_lines_of_progress_where_there_is_no_terminal(
     drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(registration, "EVERY", 0)
+    monkeypatch.setattr(progress, "EVERY", 0)
     lines = register(drive, tmp_path / "a").stderr.splitlines()
     assert lines
     for line in lines:

@@ -43,6 +43,10 @@ def split_signature(doc: str) -> tuple[tuple[str, ...], str]:
     return tuple(name for name in names if name not in ("", "self", "/", "*")), one_line(rest)
 
 
+def is_bound_by_pybind(value: Any) -> bool:
+    return type(value).__name__ == "instancemethod"
+
+
 def bound(owner: Any, prefix: str = "") -> Iterator[tuple[str, Name]]:
     for name, value in vars(owner).items():
         path = prefix + name
@@ -54,7 +58,7 @@ def bound(owner: Any, prefix: str = "") -> Iterator[tuple[str, Name]]:
         elif isinstance(value, property):
             kind = "settable property" if value.fset else "property"
             yield path, Name(kind, (), one_line(value.__doc__))
-        elif name != "__init__" or type(value).__name__ == "instancemethod":
+        elif name != "__init__" or hasattr(value, "__wrapped__") or is_bound_by_pybind(value):
             doc = getattr(owner, name).__doc__
             yield path, Name("function", *split_signature(doc))
 

@@ -15,9 +15,9 @@ from common import machine
 from figures import figure
 from night import NightRig
 
+from xcalib import evaluate
 from xcalib._core import draw_frames
 from xcalib.choose import choose_informed
-from xcalib.evaluate import evaluate
 
 
 def main() -> None:

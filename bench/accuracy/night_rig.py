@@ -52,8 +52,7 @@ def main() -> None:
         figure(f"{score} gain", 100 * gain(judged, score, over="whole"), "%")
         figure(f"{score} gain, same mask", 100 * gain(judged, score), "%")
     unregistered = [
-        metrics.patch_residual(view.reference, view.unregistered, view.inside).norms
-        for view in views
+        metrics.patch_residual(view.reference, view.unregistered, view.mask).norms for view in views
     ]
     for image, norms in (
         ("unregistered", np.concatenate(unregistered)),

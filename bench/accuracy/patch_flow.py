@@ -134,7 +134,7 @@ def night_rig() -> None:
         confident = (confidence >= CONFIDENT) & (view.inside > 0)
         lengths.append(np.linalg.norm(flow, axis=-1)[confident])
         shares.append(confident.sum() / view.inside.sum())
-        residual = metrics.patch_residual(view.reference, view.registered, view.inside)
+        residual = metrics.patch_residual(view.reference, view.registered, view.mask)
         patches.append(residual.norms)
         for (x, y), shift in zip(
             residual.centers.round().astype(int), residual.shifts, strict=True

@@ -12,6 +12,7 @@
 #include "xcalib/depth/fit_plane.hpp"
 #include "xcalib/draw_frames.hpp"
 #include "xcalib/footage/choose.hpp"
+#include "xcalib/footage/joined.hpp"
 #include "xcalib/judge/documents.hpp"
 #include "xcalib/option_words.hpp"
 #include "xcalib/rig_file.hpp"
@@ -214,6 +215,7 @@ void run(Arguments a, bool has_report, Console& console) {
     const std::vector<int> chosen =
         a.choose == "informed" ? choose_by_content(frames, a, console, run)
                                : draw_frames(frames.size(), options.max_frames, options.seed);
+    if (a.frames.dry_run) return say_plan(frames, {a.output, a.report}, chosen, console);
     LoadedFrames loaded = load(frames, chosen, console);
     const auto sized = [](Pinhole camera, const Picture& image) {
         camera.width = image.view.width;
@@ -252,6 +254,8 @@ void run(Arguments a, bool has_report, Console& console) {
         console.line(text.str());
         console.event("plane", {{"horizon", plane.horizon}, {"plane_roll", plane.roll_deg}});
     }
+    distrust(joined_line(loaded.views(&Frame::reference), "REFERENCE"), result);
+    distrust(joined_line(loaded.views(&Frame::source), "SOURCE"), result);
     look_at_lags(frames, loaded, options, initial, console, result, run);
     const Path output(a.output);
     if (output.has_parent_path()) std::filesystem::create_directories(output.parent_path());
@@ -265,6 +269,7 @@ void run(Arguments a, bool has_report, Console& console) {
         write_file(a.report, document);
         console.line("report: " + a.report);
     }
+    say_depth(*frames.depth, console);
     console.result(Json::parse(document));
     if (!result.converged) throw NotTrusted(result.report.message);
 }
@@ -392,6 +397,7 @@ void add_calibrate(CLI::App& app, Console& console) {
         command->add_option("--report", a.report, "Also write the full report (JSON).")
             ->type_name("FILE");
     command->add_flag("--quiet", console.quiet, "No progress.");
+    add_rare_depth(*command, a.frames.depth);
     command->fallthrough();
     command->callback(
         [arguments, report, &console] { run(*arguments, !report->empty(), console); });

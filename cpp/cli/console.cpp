@@ -15,10 +15,15 @@ namespace {
 
 constexpr auto kBetweenLines = std::chrono::seconds(10);
 
+// But for a list of options, each on a line of its own.
 std::string one_line(const std::string& text) {
-    std::istringstream words(text);
     std::string line;
-    for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
+    for (std::size_t at = 0, next; at < text.size(); at = next) {
+        next = std::min(text.find("\n  --", at + 1), text.size());
+        std::istringstream words(text.substr(at, next - at));
+        const char* space = at == 0 ? "" : "\n  ";
+        for (std::string word; words >> word; space = " ") line += space + word;
+    }
     return line;
 }
 
@@ -109,9 +114,10 @@ void Console::show(const std::string& stage, double fraction, const std::string&
         const std::lock_guard lock(mutex_);
         if (quiet) return;
         const auto now = std::chrono::steady_clock::now();
-        if (!json && !terminal && !detail.empty() && now - said_ > kBetweenLines) {
+        if (!json && !terminal && now - said_ > kBetweenLines) {
             said_ = now;
-            put_on_stderr(stage + ": " + detail + "\n");
+            put_on_stderr(stage + ": " +
+                          (detail.empty() ? std::to_string(percent) + " %" : detail) + "\n");
         }
         if (percent == percent_ && stage == stage_) return;
         percent_ = percent;

@@ -1,24 +1,24 @@
 #include "depth.hpp"
 
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 
 #include "files.hpp"
 #include "footage.hpp"
 #include "xcalib/depth/complete_depth.hpp"
 #include "xcalib/depth/steady_depth.hpp"
-#include "xcalib/stream/npy.hpp"
+#include "xcalib/stream/arrays.hpp"
 
 namespace xcalib::cli {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string type_name(int depth) {
-    static const char* const kNames[] = {"uint8", "int8",    "uint16",  "int16",
-                                         "int32", "float32", "float64", "float16"};
-    return kNames[depth];
-}
+const std::string kDisparity = "disparity:";
+
+bool is_png(const Path& file) { return lower_suffix(file) == ".png"; }
 
 class Plane : public Depth {
    public:
@@ -33,12 +33,25 @@ class Plane : public Depth {
     PlaneDepth plane_;
 };
 
+class Constant : public Depth {
+   public:
+    explicit Constant(float metres) : metres_(metres) {}
+    Picture operator()(int, const Picture& reference) override {
+        return picture_of(Image(reference.view.width, reference.view.height, metres_));
+    }
+    bool concurrent() const override { return true; }
+
+   private:
+    float metres_;
+};
+
 class Files : public Depth {
    public:
-    Files(std::vector<Path> paths, double scale) : paths_(std::move(paths)), scale_(scale) {}
+    Files(std::vector<Path> paths, DepthUnits units)
+        : paths_(std::move(paths)), units_(std::move(units)) {}
     Picture operator()(int index, const Picture& reference) override {
         const Path& path = paths_[static_cast<std::size_t>(index)];
-        const Picture depth = picture_of(read_depth(path, scale_));
+        const Picture depth = picture_of(read_depth(path, units_));
         const ImageView &map = depth.view, &image = reference.view;
         const long difference = std::labs(static_cast<long>(map.width) * image.height -
                                           static_cast<long>(map.height) * image.width);
@@ -53,10 +66,19 @@ class Files : public Depth {
     std::vector<Path> files(int index) const override {
         return {paths_[static_cast<std::size_t>(index)]};
     }
+    std::string line() const override {
+        try {
+            const Path& first = paths_.at(0);
+            const Picture numbers = read_numbers(first);
+            return units_line(numbers.view, units_, first.string(), is_png(first));
+        } catch (const InputError&) {
+            return "";  // which is said when the map is needed
+        }
+    }
 
    private:
     std::vector<Path> paths_;
-    double scale_;
+    DepthUnits units_;
 };
 
 class Steadied : public Depth {
@@ -68,6 +90,7 @@ class Steadied : public Depth {
     }
     std::vector<Path> files(int index) const override { return depth_->files(index); }
     bool steadied() const override { return true; }
+    std::string line() const override { return depth_->line(); }
 
    private:
     DepthPointer depth_;
@@ -85,81 +108,89 @@ class Completed : public Depth {
     std::vector<Path> files(int index) const override { return depth_->files(index); }
     bool concurrent() const override { return depth_->concurrent(); }
     bool steadied() const override { return depth_->steadied(); }
+    std::string line() const override { return depth_->line(); }
 
    private:
     DepthPointer depth_;
     double min_confidence_;
 };
 
+// The number that a spec is, if it is one.
+std::optional<double> number_of(const std::string& spec) {
+    double value = 0;
+    const char* const end = spec.data() + spec.size();
+    if (std::from_chars(spec.data(), end, value).ptr != end || spec.empty()) return std::nullopt;
+    return value;
+}
+
 DepthPointer open_given(const DepthArguments& arguments, const FrameList& references,
                         const std::vector<int>& used) {
-    const std::string& spec = arguments.spec;
+    std::string spec = arguments.spec;
     if (spec == "plane") return plane_depth(arguments.plane);
     if (spec.rfind("stereo:", 0) == 0)
         throw InputError("depth " + spec +
                          ": stereo partners are matched by the Python command, `xcalib`");
+    DepthUnits units = arguments.units;
+    if (spec.rfind(kDisparity, 0) == 0) {
+        spec.erase(0, kDisparity.size());
+        if (units.baseline == 0 || units.focal == 0)
+            throw InputError(
+                "--depth disparity: expected --stereo-baseline and --stereo-focal,"
+                " or --stereo-calibration");
+    } else if (units.baseline != 0 || units.focal != 0 || units.doffs != 0) {
+        throw InputError("depth " + spec +
+                         ": stereo options go with --depth stereo:FOLDER or"
+                         " disparity:FOLDER");
+    }
     const Path folder(spec);
     if (lower_suffix(folder) == ".onnx" && !fs::is_directory(folder))
         throw InputError("depth " + spec + ": networks are run by the Python command, `xcalib`");
     if (spec.find('#') != std::string::npos && !fs::exists(folder))
         throw InputError("depth " + spec +
                          ": bags are read by the Python command, `xcalib`, with the extra `ros`");
+    if (const auto metres = number_of(spec); metres && !fs::exists(folder))
+        return constant_depth(*metres);
     if (!fs::is_directory(folder))
         throw InputError("depth " + spec +
-                         ": expected an existing folder of depth maps, or `plane`");
-    if (!(arguments.scale > 0 && std::isfinite(arguments.scale))) {
-        char text[64];
-        std::snprintf(text, sizeof text, "%g", arguments.scale);
-        throw InputError("depth scale is " + std::string(text) + ", expected above 0 m per count");
-    }
+                         ": expected an existing folder of depth maps, `plane`, or a distance in"
+                         " metres");
+    units.validate();
     const ImageFiles maps(list_files(folder, kDepthSuffixes));
     std::vector<Path> paths;
     const std::vector<Path> all = maps.paths();
     for (const int index : match_depths(references, used, maps.frames()))
         paths.push_back(all[static_cast<std::size_t>(index)]);
-    return std::make_shared<Files>(std::move(paths), arguments.scale);
+    return std::make_shared<Files>(std::move(paths), units);
 }
 
 }  // namespace
 
-cv::Mat read_depth(const Path& file, double scale) {
-    const std::string suffix = lower_suffix(file);
-    cv::Mat depth;
-    if (suffix == ".npy") {
-        depth = mat_of(read_npy(file).view).clone();
-    } else {
-        const cv::Mat values = decode(file);
-        if (values.channels() != 1)
-            throw InputError(file.string() + ": depth has shape (" + std::to_string(values.rows) +
-                             ", " + std::to_string(values.cols) + ", " +
-                             std::to_string(values.channels()) + "), expected one channel (h, w)");
-        if (suffix == ".png") {
-            if (values.depth() != CV_16U)
-                throw InputError(file.string() + ": depth is " + type_name(values.depth()) +
-                                 ", expected a 16-bit PNG");
-            depth.create(values.size(), CV_32F);
-            const float metres = static_cast<float>(scale);
-            for (int y = 0; y < depth.rows; ++y)
-                for (int x = 0; x < depth.cols; ++x)
-                    depth.at<float>(y, x) =
-                        static_cast<float>(values.at<std::uint16_t>(y, x)) * metres;
-        } else {
-            if (values.depth() != CV_32F && values.depth() != CV_64F && values.depth() != CV_16F)
-                throw InputError(file.string() + ": depth is " + type_name(values.depth()) +
-                                 ", expected floats in metres");
-            values.convertTo(depth, CV_32F);
-        }
-    }
-    bool any = false;
-    for (int y = 0; y < depth.rows; ++y)
-        for (int x = 0; x < depth.cols; ++x) {
-            float& value = depth.at<float>(y, x);
-            if (value > 0 && std::isfinite(value)) any = true;
-            else value = 0;
-        }
-    if (!any)
-        throw InputError(file.string() + ": all depth is unknown, expected some pixels above 0 m");
-    return depth;
+Picture read_numbers(const Path& file) {
+    if (const auto array = read_array(file, ArrayKind::depth)) return *array;
+    cv::Mat values = decode(file);
+    if (values.channels() != 1)
+        throw InputError(file.string() + ": depth has shape (" + std::to_string(values.rows) +
+                         ", " + std::to_string(values.cols) + ", " +
+                         std::to_string(values.channels()) + "), expected one channel (h, w)");
+    const int depth = values.depth();
+    if (is_png(file) && depth != CV_16U)
+        throw InputError(file.string() + ": depth is " + type_name(depth) +
+                         ", expected a 16-bit PNG");
+    if (depth == CV_64F || depth == CV_16F) values.convertTo(values, CV_32F);
+    if (values.depth() != CV_16U && values.depth() != CV_32F)
+        throw InputError(file.string() + ": depth is " + type_name(depth) +
+                         ", expected floats in metres");
+    return picture_of(values);
+}
+
+Image read_depth(const Path& file, const DepthUnits& units) {
+    return metres_of(read_numbers(file).view, units, file.string(), is_png(file));
+}
+
+DepthPointer constant_depth(double metres) {
+    if (!(metres > 0 && std::isfinite(metres)))
+        throw InputError("depth is " + std::to_string(metres) + ", expected a distance above 0 m");
+    return std::make_shared<Constant>(static_cast<float>(metres));
 }
 
 DepthPointer plane_depth(const PlaneDepth& plane) { return std::make_shared<Plane>(plane); }

@@ -11,13 +11,16 @@
 
 namespace xcalib::cli {
 
-inline const std::vector<std::string> kDepthSuffixes = {".png", ".npy", ".tif", ".tiff", ".exr"};
+inline const std::vector<std::string> kDepthSuffixes = {".png", ".npy",  ".npz", ".pfm",
+                                                        ".tif", ".tiff", ".exr"};
 
-// One depth map, float32 [m], 0 where it is not positive and finite; some pixel must be known.
-// `scale`: metres per count of a 16-bit PNG; .npy, .tiff and .exr are in metres.
-cv::Mat read_depth(const Path& file, double scale);
+// The numbers of one depth map as they are stored, uint16 or float32.
+Picture read_numbers(const Path& file);
+// The same as depth, [m], 0 where unknown.
+Image read_depth(const Path& file, const DepthUnits& units);
 
 DepthPointer plane_depth(const PlaneDepth& plane);
+DepthPointer constant_depth(double metres);
 
 // What --depth names, for the frames `used` of the references, conditioned as asked for: steadied,
 // then completed.

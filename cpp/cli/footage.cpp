@@ -7,6 +7,7 @@
 #include <regex>
 
 #include "files.hpp"
+#include "flir_files.hpp"
 #include "video.hpp"
 
 namespace xcalib::cli {
@@ -77,7 +78,8 @@ std::vector<Path> matching_files(const Path& pattern) {
         globfree(&matches);
     }
     const auto unusable = [](const Path& file) {
-        return !has_suffix(file, kImageSuffixes) || !fs::is_regular_file(file);
+        return !(has_suffix(file, kImageSuffixes) || has_suffix(file, kArraySuffixes)) ||
+               !fs::is_regular_file(file);
     };
     found.erase(std::remove_if(found.begin(), found.end(), unusable), found.end());
     if (found.empty()) throw InputError(pattern.string() + ": no image file matches");
@@ -94,6 +96,14 @@ bool is_bag(const Path& path) {
     return fs::is_directory(path) && fs::exists(path / "metadata.yaml");
 }
 
+StreamPointer radiometric(const StreamPointer& stream, const std::string& part,
+                          const std::string& spec) {
+    const std::vector<Path> paths = stream->paths();
+    if (paths.empty() || !is_radiometric(paths[0]))
+        throw InputError(spec + ": expected radiometric JPEGs of a FLIR camera before #" + part);
+    return std::make_shared<RadiometricFiles>(paths, part);
+}
+
 [[noreturn]] void refuse_bag(const std::string& spec) {
     throw InputError(spec +
                      ": bags are read by the Python command, `xcalib`, with the extra `ros`");
@@ -105,9 +115,7 @@ ImageFiles::ImageFiles(std::vector<Path> paths) : paths_(std::move(paths)) {
     std::vector<std::string> stems;
     for (const Path& path : paths_) stems.push_back(path.stem().string());
     times = times_of_names(stems);
-    for (const char* table : {"timestamps.csv", "timestamps.txt"})
-        if (!paths_.empty() && fs::is_regular_file(paths_[0].parent_path() / table))
-            times = read_times(paths_[0].parent_path() / table, *this);
+    if (const auto beside = times_beside(paths_, *this, said)) times = beside;
 }
 
 StreamPointer open_stream(const std::string& spec) {
@@ -117,8 +125,13 @@ StreamPointer open_stream(const std::string& spec) {
         const std::string base = spec.substr(0, hash), part = spec.substr(hash + 1);
         if (std::find(kHalves.begin(), kHalves.end(), part) != kHalves.end())
             return std::make_shared<Half>(open_stream(base), part);
+        if (std::find(kRadiometricParts.begin(), kRadiometricParts.end(), part) !=
+            kRadiometricParts.end())
+            return radiometric(open_stream(base), part, spec);
         if (is_bag(base)) refuse_bag(spec);
-        throw InputError(spec + ": expected one of #left, #right, #top, #bottom behind a path");
+        throw InputError(spec +
+                         ": expected one of #left, #right, #top, #bottom behind a path, or,"
+                         " behind radiometric JPEGs, of #visible, #thermal, #temperature");
     }
     if (is_bag(path)) refuse_bag(spec);
     if (fs::is_regular_file(path)) {
@@ -129,8 +142,21 @@ StreamPointer open_stream(const std::string& spec) {
             return std::make_shared<ImageFiles>(matching_files(path));
         if (has_suffix(path, kVideoSuffixes)) throw InputError(spec + ": no such file");
     }
-    // Which says what is wrong with it.
-    return std::make_shared<ImageFiles>(list_files(path, kImageSuffixes));
+    return std::make_shared<ImageFiles>(list_images(path));
+}
+
+std::pair<StreamPointer, StreamPointer> open_two(const std::string& reference,
+                                                 const std::string& source) {
+    StreamPointer first = open_stream(reference), second = open_stream(source);
+    const std::vector<Path> paths = first->paths();
+    if (!paths.empty() && paths == second->paths() && is_radiometric(paths[0])) {
+        first = std::make_shared<RadiometricFiles>(paths, "visible");
+        second = std::make_shared<RadiometricFiles>(paths, "thermal");
+        first->said = reference +
+                      ": radiometric JPEGs, of which the visible image is the reference"
+                      " and the raw thermal one the source";
+    }
+    return {first, second};
 }
 
 }  // namespace xcalib::cli

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pictures.hpp"
@@ -32,5 +33,10 @@ class ImageFiles : public Stream {
 // a TIFF stack; a video. `#left`, `#right`, `#top` or `#bottom` behind any of them takes that half
 // of each frame. A path that exists is taken as it is, whatever is in its name.
 StreamPointer open_stream(const std::string& spec);
+
+// Both, one after the other. Radiometric JPEGs given as both are the visible image and the raw
+// thermal one in each.
+std::pair<StreamPointer, StreamPointer> open_two(const std::string& reference,
+                                                 const std::string& source);
 
 }  // namespace xcalib::cli

@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "commands.hpp"
+#include "config.hpp"
 #include "xcalib/error.hpp"
 #include "xcalib/stream/files.hpp"
 #include "xcalib/stream/interrupts.hpp"
@@ -56,8 +57,20 @@ int run(int argc, char** argv, Console& console) {
     for (int i = 1; i < argc; ++i) xcalib::check_name(argv[i]);
     console.arguments.assign(argv + 1, argv + argc);
     check_command(app, argc, argv);
+    std::vector<std::string> arguments(argv + 1, argv + argc);
+    const auto name = std::find_if(arguments.begin(), arguments.end(),
+                                   [](const std::string& word) { return word[0] != '-'; });
+    if (name != arguments.end() && std::any_of(name, arguments.end(), [](const std::string& word) {
+            return word.rfind("--config", 0) == 0;
+        })) {
+        const std::vector<std::string> given(name + 1, arguments.end());
+        const std::vector<std::string> own = with_config(*app.get_subcommand(*name), given);
+        arguments.erase(name + 1, arguments.end());
+        arguments.insert(arguments.end(), own.begin(), own.end());
+    }
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
     try {
-        app.parse(argc, argv);
+        app.parse(std::move(arguments));
     } catch (const CLI::Success& wanted) {  // help, version
         return app.exit(wanted);
     } catch (const CLI::ParseError& error) {

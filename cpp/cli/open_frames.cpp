@@ -1,10 +1,13 @@
 #include "open_frames.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include "depth.hpp"
 #include "footage.hpp"
 #include "xcalib/rig_file.hpp"
 #include "xcalib/stream/oriented.hpp"
 #include "xcalib/stream/pairs.hpp"
+#include "xcalib/stream/plan.hpp"
 
 namespace xcalib::cli {
 
@@ -16,16 +19,15 @@ Rig load_rig(const std::string& file, Console& console) {
 
 Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& rig,
                    Console& console) {
-    if (arguments.depth.spec.empty()) throw InputError("Missing option '--depth'.");
+    if (arguments.depth.spec.empty()) throw InputError(depth_choices());
     const bool turns = arguments.exif_orientation == "apply";
-    const auto opened = [&](const std::string& spec) {
-        const StreamPointer stream = open_stream(spec);
-        const std::string line = orientation_line(*stream, turns);
-        if (!line.empty()) console.note(line);
-        return turns ? oriented(stream) : stream;
-    };
-    const StreamPointer references = opened(arguments.reference);
-    Pairs pairs(references, opened(arguments.source),
+    auto [references, sources] = open_two(arguments.reference, arguments.source);
+    for (StreamPointer* stream : {&references, &sources}) {
+        if (const std::string line = orientation_line(**stream, turns); !line.empty())
+            console.note(line);
+        if (turns) *stream = oriented(*stream);
+    }
+    Pairs pairs(references, sources,
                 {arguments.pairing, arguments.time_offset, arguments.max_gap,
                  arguments.reference_times, arguments.source_times});
     arguments.depth.plane.validate();
@@ -48,6 +50,21 @@ Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& 
     frames.sources = picked(frames.all_sources, frames.partners);
     if (!said.empty()) console.note(said);
     return frames;
+}
+
+void say_depth(const Depth& depth, Console& console) {
+    const std::string line = depth.line();
+    if (line.empty()) return;
+    console.line(line);
+    console.event("note", {{"message", line}});
+}
+
+void say_plan(const Frames& frames, const std::vector<std::string>& outputs,
+              const std::vector<int>& chosen, Console& console) {
+    console.line(plan_text(frames, chosen));
+    say_depth(*frames.depth, console);
+    for (const std::string& output : outputs)
+        if (!output.empty()) console.line("would be written: " + output);
 }
 
 }  // namespace xcalib::cli

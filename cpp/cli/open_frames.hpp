@@ -18,4 +18,11 @@ Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& ri
 // The frames with false colour turned back to numbers, as the console says.
 Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& console);
 
+// What the numbers of the depth maps were taken for, once it is known that they will do.
+void say_depth(const Depth& depth, Console& console);
+
+// What a run would read, pair, choose and write; outputs without a name are none.
+void say_plan(const Frames& frames, const std::vector<std::string>& outputs,
+              const std::vector<int>& chosen, Console& console);
+
 }  // namespace xcalib::cli

@@ -9,43 +9,48 @@
 namespace xcalib::cli {
 namespace {
 
+void group(CLI::App& command, const char* title, std::initializer_list<const char*> options) {
+    for (const char* option : options) command.get_option(option)->group(title);
+}
+
 void add_depth(CLI::App& command, DepthArguments& arguments) {
     command
-        .add_option("--depth", arguments.spec,
-                    "Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr"
-                    " in m; 0 unknown), or `plane` for a flat road.")
+        .add_option(
+            "--depth", arguments.spec,
+            "Folder with a depth map per reference image (16-bit PNG; .npy, .npz, .pfm, .tiff,"
+            " .exr in m; 0 unknown), `disparity:FOLDER`, `plane` for a flat road, or one"
+            " distance in metres.")
         ->type_name("DEPTH")
         ->check(kNamed);
-    command.add_option("--depth-scale", arguments.scale, "Metres per count of 16-bit PNG depth.")
-        ->type_name("M")
-        ->default_str("1/256");
-    const auto number = [&command](const char* flag, double& value, const char* unit,
-                                   const char* text) {
-        command.add_option(flag, value, text)->type_name(unit)->capture_default_str();
-    };
-    number("--camera-height", arguments.plane.camera_height, "M",
-           "Plane: height of the reference camera above the road [m].");
-    number("--horizon", arguments.plane.horizon, "F",
-           "Plane: row of the horizon [fraction of the image height from the top].");
-    number("--far", arguments.plane.far, "M",
-           "Plane: largest depth, at and above the horizon too [m].");
-    number("--plane-hfov", arguments.plane.hfov_deg, "DEG",
-           "Plane: horizontal field of view of the reference camera [deg].");
-    number("--plane-roll", arguments.plane.roll_deg, "DEG",
-           "Plane: how far the horizon falls towards the right [deg].");
+    CLI::Option* const scale =
+        command
+            .add_option("--depth-scale", arguments.units.scale,
+                        "Metres per count of depth maps (px of disparities).  [default: 1/256 of"
+                        " 16-bit PNG, 1 of floats]")
+            ->type_name("M");
+    command
+        .add_option_function<std::string>(
+            "--depth-unit",
+            [&arguments, scale](const std::string& word) {
+                if (!scale->empty())
+                    throw InputError(
+                        "--depth-unit and --depth-scale both say the unit, expected one of them");
+                arguments.units.scale = depth_unit_of(word);
+            },
+            "The same in words: mm, cm, m, or 1/256 of a metre.")
+        ->type_name("UNIT");
+    command
+        .add_option("--depth-invalid", arguments.units.invalid,
+                    "Numbers of depth maps that mean unknown, besides 0, NaN and 65535.")
+        ->type_name("N[,N]")
+        ->delimiter(',')
+        ->allow_extra_args(false);
     command.add_flag("--depth-steady", arguments.steady,
                      "Average depth over consecutive frames of a video.");
     command.add_flag("--complete", arguments.complete, "Fill unknown depth along image edges.");
-    number("--completion-confidence", arguments.completion_confidence, "F",
-           "Complete: filled pixels below this confidence stay unknown, 0 to 1.");
-    add_python_only(
-        command,
-        {"--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"},
-        "networks are run");
-    add_python_only(command, {"--lidar-calibration"}, "lidar scans are read");
-    add_python_only(
-        command, {"--stereo-calibration", "--stereo-baseline", "--stereo-focal", "--stereo-doffs"},
-        "stereo partners are matched");
+    group(command, "Depth",
+          {"--depth", "--depth-scale", "--depth-unit", "--depth-invalid", "--depth-steady",
+           "--complete"});
 }
 
 void add_footage(CLI::App& command, FrameArguments& arguments) {
@@ -89,9 +94,53 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
         ->type_name("HOW")
         ->check(CLI::IsMember({"ignore", "apply"}))
         ->capture_default_str();
+    group(command, "Footage and pairing",
+          {"--pair", "--time-offset", "--max-gap", "--reference-times", "--source-times",
+           "--exif-orientation"});
 }
 
 }  // namespace
+
+void add_rare_depth(CLI::App& command, DepthArguments& arguments) {
+    const auto number = [&command](const char* flag, double& value, const char* unit,
+                                   const char* text) {
+        command.add_option(flag, value, text)->type_name(unit)->capture_default_str();
+    };
+    number("--camera-height", arguments.plane.camera_height, "M",
+           "Plane: height of the reference camera above the road [m].");
+    number("--horizon", arguments.plane.horizon, "F",
+           "Plane: row of the horizon [fraction of the image height from the top].");
+    number("--far", arguments.plane.far, "M",
+           "Plane: largest depth, at and above the horizon too [m].");
+    number("--plane-hfov", arguments.plane.hfov_deg, "DEG",
+           "Plane: horizontal field of view of the reference camera [deg].");
+    number("--plane-roll", arguments.plane.roll_deg, "DEG",
+           "Plane: how far the horizon falls towards the right [deg].");
+    command
+        .add_option("--stereo-baseline", arguments.units.baseline,
+                    "Disparity: distance of the two visible cameras [m].")
+        ->type_name("M");
+    command
+        .add_option("--stereo-focal", arguments.units.focal,
+                    "Disparity: focal length of the rectified images [px].")
+        ->type_name("PX");
+    command
+        .add_option("--stereo-doffs", arguments.units.doffs,
+                    "Disparity: principal point of the right camera minus the left's [px]."
+                    "  [default: 0]")
+        ->type_name("PX");
+    number("--completion-confidence", arguments.completion_confidence, "F",
+           "Complete: filled pixels below this confidence stay unknown, 0 to 1.");
+    add_python_only(
+        command,
+        {"--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"},
+        "networks are run");
+    add_python_only(command, {"--lidar-calibration"}, "lidar scans are read");
+    add_python_only(command, {"--stereo-calibration"}, "stereo calibrations are read");
+    group(command, "Depth by a plane, a network, lidar or stereo",
+          {"--camera-height", "--horizon", "--far", "--plane-hfov", "--plane-roll",
+           "--stereo-baseline", "--stereo-focal", "--stereo-doffs", "--completion-confidence"});
+}
 
 const CLI::Validator kNamed(
     [](std::string& name) {
@@ -104,6 +153,14 @@ void add_frames(CLI::App& command, FrameArguments& arguments) {
     command.add_option("SOURCE", arguments.source)->required()->check(kNamed);
     add_depth(command, arguments.depth);
     add_footage(command, arguments);
+    // main() has put what the file says among the arguments by now.
+    command
+        .add_option("--config",
+                    "Take arguments from a YAML file, by their names without dashes (reference,"
+                    " source, depth, ...); those given here go before.")
+        ->type_name("FILE");
+    command.add_flag("--dry-run", arguments.dry_run,
+                     "Print what would be read, paired and written, and do no more.");
 }
 
 void add_threads(CLI::App& command, int& threads) {

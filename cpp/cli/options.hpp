@@ -6,6 +6,7 @@
 #include <string>
 
 #include "xcalib/depth/complete_depth.hpp"
+#include "xcalib/depth/depth_units.hpp"
 #include "xcalib/depth/plane_depth.hpp"
 #include "xcalib/footage/sequence.hpp"
 
@@ -18,7 +19,7 @@ namespace xcalib::cli {
 
 struct DepthArguments {
     std::string spec;
-    double scale = 1.0 / 256;  // metres per count of a 16-bit PNG
+    DepthUnits units;
     PlaneDepth plane;
     bool steady = false, complete = false;
     double completion_confidence = kCompletionConfidence;
@@ -32,7 +33,11 @@ struct FrameArguments {
     std::optional<double> max_gap;
     std::string reference_times, source_times;
     std::string exif_orientation = "ignore";
+    bool dry_run = false;
 };
+
+// The depth options that few need: the last in the help.
+void add_rare_depth(CLI::App& command, DepthArguments& arguments);
 
 // REFERENCE, SOURCE and how they and their depth are read.
 void add_frames(CLI::App& command, FrameArguments& arguments);

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "xcalib/footage/exif.hpp"
+#include "xcalib/stream/arrays.hpp"
 #include "xcalib/stream/files.hpp"
 #include "xcalib/stream/tiff.hpp"
 
@@ -55,6 +56,15 @@ cv::Mat mat_of(const ImageView& image) {
             const_cast<void*>(image.data), static_cast<std::size_t>(image.row_bytes)};
 }
 
+std::vector<Path> list_images(const Path& folder) {
+    std::vector<std::string> every = kImageSuffixes;
+    every.insert(every.end(), kArraySuffixes.begin(), kArraySuffixes.end());
+    std::vector<Path> files = list_files(folder, every), images;
+    for (const Path& file : files)
+        if (lower_suffix(file) != kArraySuffixes[0]) images.push_back(file);
+    return images.empty() ? files : images;
+}
+
 cv::Mat as_image(cv::Mat pixels, const std::string& where) {
     if (pixels.channels() == 2) cv::extractChannel(pixels, pixels, 0);
     if (pixels.channels() == 4) {
@@ -62,25 +72,37 @@ cv::Mat as_image(cv::Mat pixels, const std::string& where) {
         cv::mixChannels({pixels}, {colour}, {0, 0, 1, 1, 2, 2});
         pixels = colour;
     }
-    if (pixels.depth() != CV_8U && pixels.depth() != CV_16U && pixels.depth() != CV_32F) {
-        static const char* const kNames[] = {"uint8", "int8",    "uint16",  "int16",
-                                             "int32", "float32", "float64", "float16"};
-        throw InputError(where + ": pixels are " + kNames[pixels.depth()] +
+    if (pixels.depth() != CV_8U && pixels.depth() != CV_16U && pixels.depth() != CV_32F)
+        throw InputError(where + ": pixels are " + type_name(pixels.depth()) +
                          ", expected uint8, uint16 or float32");
-    }
     return pixels;
 }
 
+std::string type_name(int depth) {
+    static const char* const kNames[] = {"uint8", "int8",    "uint16",  "int16",
+                                         "int32", "float32", "float64", "float16"};
+    return kNames[depth];
+}
+
 cv::Mat read_image(const Path& file) {
+    if (const auto array = read_array(file, ArrayKind::image)) return mat_of(array->view).clone();
     cv::Mat pixels = decode(file);
     if (pixels.depth() == CV_64F) pixels.convertTo(pixels, CV_32F);
     return as_image(pixels, file.string());
 }
 
 cv::Mat decode(const Path& file) {
-    if (!std::filesystem::is_regular_file(file)) throw InputError(file.string() + ": no such file");
-    std::string data = read_file(file);
+    if (!std::filesystem::is_regular_file(file)) {
+        if (std::filesystem::is_symlink(file))
+            throw DecodeError(file.string() + ": a link to a file that is not there");
+        throw InputError(file.string() + ": no such file");
+    }
+    return decode_bytes(read_file(file), file.string());
+}
+
+cv::Mat decode_bytes(std::string data, const std::string& name) {
     forget_tiff_orientation(data);
+    put_full_page_first(data, name);
     cv::Mat pixels;
     if (!data.empty() && !is_truncated(data)) {
         try {
@@ -92,10 +114,9 @@ cv::Mat decode(const Path& file) {
     }
     const std::string type = pixels.empty() ? tiff_pixel_type(data) : "";
     if (!type.empty() && type != "uint8" && type != "uint16" && type != "float32")
-        throw InputError(file.string() + ": pixels are " + type +
-                         ", expected uint8, uint16 or float32");
+        throw InputError(name + ": pixels are " + type + ", expected uint8, uint16 or float32");
     if (pixels.empty())
-        throw DecodeError(file.string() + ": cannot decode " + std::to_string(data.size()) +
+        throw DecodeError(name + ": cannot decode " + std::to_string(data.size()) +
                           " bytes, truncated or not an image");
     return pixels;
 }

@@ -13,8 +13,12 @@ namespace xcalib::cli {
 
 using Path = std::filesystem::path;
 
-inline const std::vector<std::string> kImageSuffixes = {".png", ".jpg",  ".jpeg",
-                                                        ".tif", ".tiff", ".bmp"};
+inline const std::vector<std::string> kImageSuffixes = {".png", ".jpg", ".jpeg", ".tif",  ".tiff",
+                                                        ".bmp", ".pgm", ".ppm",  ".webp", ".jp2"};
+inline const std::vector<std::string> kArraySuffixes = {".npy"};
+
+// The image files of a folder; arrays where it has no other, for they may lie beside images.
+std::vector<Path> list_images(const Path& folder);
 
 // The pixels of a matrix of 1 or 3 channels, uint8, uint16 or float32.
 ImageView view_of(const cv::Mat& pixels);
@@ -31,8 +35,13 @@ cv::Mat read_image(const Path& file);
 // The same of decoded pixels; `where` names them in an InputError.
 cv::Mat as_image(cv::Mat pixels, const std::string& where);
 
+// As numpy calls OpenCV's type of a channel.
+std::string type_name(int depth);
+
 // All channels as they are. Throws DecodeError.
 cv::Mat decode(const Path& file);
+// The same of the bytes of a file; `name` names it in messages.
+cv::Mat decode_bytes(std::string data, const std::string& name);
 
 // A file of the kind that the suffix says.
 std::string encode_image(const Path& file, const ImageView& image);

@@ -15,6 +15,7 @@ void run(RegisterArguments a, Console& console) {
     a.options.registrar.occlusion = value_of<Occlusion>("--occlusion", a.occlusion);
     const Rig rig = load_rig(a.rig, console);
     Registration totals;
+    DepthPointer depth;  // of files
     check_output_writable(a.output);
     if (a.live) {
         // What a camera shows is not to be had again: there is nothing to go on with.
@@ -35,10 +36,13 @@ void run(RegisterArguments a, Console& console) {
     } else {
         if (a.depth_fd >= 0) throw InputError("--depth-fd goes with --live");
         const Frames frames = open_frames(a.frames, rig, console);
+        if (a.frames.dry_run) return say_plan(frames, {a.output}, {}, console);
         totals = register_files(a, frames, rig, console);
+        depth = frames.depth;
     }
     const double share = totals.pixels ? static_cast<double>(totals.valid) / totals.pixels : 0.0;
     console.line(totals.summary() + (a.live ? " live: " : ": ") + a.output);
+    if (depth) say_depth(*depth, console);
     console.result({{"frames", totals.frames},
                     {"earlier", totals.earlier},
                     {"valid_share", share},
@@ -109,6 +113,7 @@ void add_register(CLI::App& app, Console& console) {
         ->needs(live)
         ->capture_default_str();
     command->add_flag("--quiet", console.quiet, "No progress.");
+    add_rare_depth(*command, a.frames.depth);
     command->fallthrough();
     command->callback([arguments, &console] { run(*arguments, console); });
 }

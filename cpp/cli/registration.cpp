@@ -21,6 +21,12 @@ std::string text_of(const std::optional<double>& value, const char* none) {
     return value ? text_of(*value) : none;
 }
 
+std::string texts_of(const std::vector<double>& values) {
+    std::string text;
+    for (const double value : values) text += (text.empty() ? "" : ",") + text_of(value);
+    return text;
+}
+
 std::string text_of(const TimeOffset& offset) {
     if (offset.automatic) return "auto";
     return offset.frames ? std::to_string(offset.frames) + "f" : text_of(offset.seconds);
@@ -31,13 +37,24 @@ std::string table_text(const std::string& file) {
     return absolute_path(file).string() + " (" + fingerprint(read_file(file)) + ")";
 }
 
+// A folder by its path from the root, with what is said before it.
+std::string depth_text(const std::string& spec) {
+    if (spec == "plane") return spec;
+    const std::size_t at = spec.rfind("disparity:", 0) == 0 ? spec.find(':') + 1 : 0;
+    return spec.substr(0, at) + absolute_path(spec.substr(at)).string();
+}
+
 // What the frames are opened with.
 MadeWith inputs_of(const FrameArguments& frames) {
     const DepthArguments& depth = frames.depth;
     return {{"reference", absolute_path(frames.reference).string()},
             {"source", absolute_path(frames.source).string()},
-            {"depth", depth.spec == "plane" ? depth.spec : absolute_path(depth.spec).string()},
-            {"depth_scale", text_of(depth.scale)},
+            {"depth", depth_text(depth.spec)},
+            {"depth_scale", text_of(depth.units.scale, "by type")},
+            {"depth_invalid", texts_of(depth.units.invalid)},
+            {"stereo_baseline", text_of(depth.units.baseline)},
+            {"stereo_focal", text_of(depth.units.focal)},
+            {"stereo_doffs", text_of(depth.units.doffs)},
             {"camera_height", text_of(depth.plane.camera_height)},
             {"horizon", text_of(depth.plane.horizon)},
             {"far", text_of(depth.plane.far)},

@@ -6,6 +6,8 @@
 #include <cstring>
 #include <opencv2/videoio.hpp>
 
+#include "xcalib/stream/video_length.hpp"
+
 namespace xcalib::cli {
 namespace {
 
@@ -25,11 +27,8 @@ class Video : public Stream {
         // Anything, of a damaged file.
         const double announced = std::clamp(capture_.get(cv::CAP_PROP_FRAME_COUNT), 0.0, 1e9);
         while (capture_.grab()) frame_times_.push_back(capture_.get(cv::CAP_PROP_POS_MSEC) / 1e3);
-        // Containers estimate their length to a frame or so; a file cut short lacks more.
-        if (frame_times_.empty() || static_cast<double>(frame_times_.size()) < 0.99 * announced - 1)
-            throw InputError(path_.string() + ": cannot decode frame " +
-                             std::to_string(frame_times_.size()) + " of about " +
-                             std::to_string(std::lround(announced)) + ", truncated");
+        const double rate = capture_.get(cv::CAP_PROP_FPS);
+        said = video_line(path_.string(), frame_times_, announced, rate);
         bool rising = true;
         for (std::size_t i = 1; i < frame_times_.size(); ++i)
             rising = rising && frame_times_[i] > frame_times_[i - 1];

@@ -4,7 +4,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "calibrate/study.hpp"
-#include "options.hpp"
+#include "value_class.hpp"
 #include "xcalib/draw_frames.hpp"
 
 namespace xcalib {
@@ -56,16 +56,14 @@ FlowEstimator estimator_of(const py::object& flow) {
     };
 }
 
-CalibrationResult calibrated_parts(const Parts& parts, const py::sequence& references,
-                                   const py::sequence& sources, const py::sequence& depths,
+CalibrationResult calibrated_parts(const Parts& parts, const py::object& references,
+                                   const py::object& sources, const py::object& depths,
                                    const std::optional<Rig>& initial,
                                    const CalibrationOptions& options, const py::object& progress,
                                    const py::object& flow) {
     const HeldList r = list_of("reference", references, image_of);
     const HeldList s = list_of("source", sources, image_of);
-    const HeldList d = list_of("depth", depths, [](const std::string& name, const py::object& map) {
-        return depth_of(name, map);
-    });
+    const HeldList d = list_of("depth", depths, metric_depth_of);
     const Progress notify = [&progress](const std::string& stage, double share) {
         const py::gil_scoped_acquire gil;
         if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
@@ -76,47 +74,56 @@ CalibrationResult calibrated_parts(const Parts& parts, const py::sequence& refer
     return calibrate_parts(parts, r.views, s.views, d.views, initial, options, notify, estimator);
 }
 
-CalibrationResult calibrated(const py::sequence& references, const py::sequence& sources,
-                             const py::sequence& depths, const std::optional<Rig>& initial,
+CalibrationResult calibrated(const py::object& references, const py::object& sources,
+                             const py::object& depths, const std::optional<Rig>& initial,
                              const CalibrationOptions& options, const py::object& progress,
                              const py::object& flow) {
     return calibrated_parts({}, references, sources, depths, initial, options, progress, flow);
 }
 
 void bind_parts(py::module_& m) {
-    py::class_<Parts>(m, "_Parts", "Parts of the method, for ablation studies: all belong on.")
-        .def(py::init(&options_from<Parts>))
-        .def_readwrite("images", &Parts::images)
-        .def_readwrite("pyramid", &Parts::pyramid)
-        .def_readwrite("stages", &Parts::stages)
-        .def_readwrite("floor", &Parts::floor)
-        .def_readwrite("pair_weights", &Parts::pair_weights)
-        .def_readwrite("normalization", &Parts::normalization)
-        .def_readwrite("depth_edges", &Parts::depth_edges);
+    ValueClass<Parts>(m, "_Parts", "Parts of the method, for ablation studies: all belong on.")
+        .def_options()
+        .def_readwrite("images", &Parts::images, "")
+        .def_readwrite("pyramid", &Parts::pyramid, "")
+        .def_readwrite("stages", &Parts::stages, "")
+        .def_readwrite("floor", &Parts::floor, "")
+        .def_readwrite("pair_weights", &Parts::pair_weights, "")
+        .def_readwrite("normalization", &Parts::normalization, "")
+        .def_readwrite("depth_edges", &Parts::depth_edges, "")
+        .as_value();
     m.def("_calibrate", &calibrated_parts, py::arg("parts"), py::arg("references"),
           py::arg("sources"), py::arg("depths"), py::arg("initial") = py::none(),
-          py::arg("options") = CalibrationOptions{}, py::arg("progress") = py::none(),
-          py::arg("flow") = py::none(), "calibrate() with parts of the method off.");
+          py::arg_v("options", CalibrationOptions{}, "CalibrationOptions()"),
+          py::arg("progress") = py::none(), py::arg("flow") = py::none(),
+          "calibrate() with parts of the method off.");
 }
 
 }  // namespace
 
 void bind_calibrate(py::module_& m) {
-    py::class_<CalibrationResult>(m, "CalibrationResult", "What calibrate() returns.")
+    ValueClass<CalibrationResult>(m, "CalibrationResult", "What calibrate() returns.")
         .def_readonly("rig", &CalibrationResult::rig, "The best rig found.")
         .def_readonly("converged", &CalibrationResult::converged, "Is it to be trusted?")
-        .def_readonly("report", &CalibrationResult::report, "CalibrationReport.");
+        .def_readonly("report", &CalibrationResult::report, "CalibrationReport.")
+        .def("__repr__",
+             [](const CalibrationResult& result) {
+                 return "CalibrationResult(" + std::string(py::repr(py::cast(result.rig))) + ", " +
+                        result.report.brief() + ")";
+             })
+        .as_value(true);
 
     m.def("draw_frames", &draw_frames, py::arg("count"), py::arg("max_frames"), py::arg("seed"),
           "Indices of max_frames of count frames, spread over all, drawn with seed; sorted.");
 
     m.def("calibrate", &calibrated, py::arg("references"), py::arg("sources"), py::arg("depths"),
-          py::arg("initial") = py::none(), py::arg("options") = CalibrationOptions{},
+          py::arg("initial") = py::none(),
+          py::arg_v("options", CalibrationOptions{}, "CalibrationOptions()"),
           py::arg("progress") = py::none(), py::arg("flow") = py::none(),
           R"(Estimates the rig from footage and depth, without a target.
 
-references, sources: sequences of (H, W) or (H, W, 3) uint8 | uint16 | float32 images, pairs by
-index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN / inf unknown.
+references, sources: lists (or other iterables) of (H, W) or (H, W, 3) uint8 | uint16 | float32 images, colour as
+blue-green-red, pairs by index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN / inf unknown.
 initial: Rig to start from. progress: called with (stage, share of the work done). flow: a
 provider as in xcalib.flow, for the flow term; None is the built-in patch flow.
 Images are copied only where they are not contiguous and aligned.

@@ -3,7 +3,7 @@
 #include <map>
 
 #include "bindings.hpp"
-#include "options.hpp"
+#include "value_class.hpp"
 #include "xcalib/calibration_options.hpp"
 #include "xcalib/footage/pairing.hpp"
 #include "xcalib/mount.hpp"
@@ -12,12 +12,12 @@ namespace xcalib {
 namespace {
 
 void bind_search_options(py::module_& m) {
-    py::class_<SearchOptions> options(m, "SearchOptions",
+    ValueClass<SearchOptions> options(m, "SearchOptions",
                                       "The global search that starts a calibration.");
-    options.def(py::init(&options_from<SearchOptions>));
-    def_word(options, "mode", &SearchOptions::mode, "search mode",
-             "auto (full without an initial rig, local with one), full, local or off.");
+    options.def_options();
     options
+        .def_word("mode", &SearchOptions::mode, "search mode",
+                  "auto (full without an initial rig, local with one), full, local or off.")
         .def_readwrite("max_fov_ratio", &SearchOptions::max_fov_ratio,
                        "Largest ratio of the two fields of view, either way, in tangents; > 1.")
         .def_readwrite("max_roll_deg", &SearchOptions::max_roll_deg, "[deg], in [0, 180].")
@@ -25,13 +25,16 @@ void bind_search_options(py::module_& m) {
                        "Geometric mean of the shares of both images' edges, in (0, 1).")
         .def_readwrite("map_width", &SearchOptions::map_width, "Width searched at [px], >= 32.")
         .def_readwrite("candidates", &SearchOptions::candidates,
-                       "Peaks refined before one is chosen, >= 1.");
+                       "Peaks refined before one is chosen, >= 1.")
+        .def("validate", &SearchOptions::validate,
+             "Raises ValueError naming the field, its value and the allowed range.")
+        .as_value();
 }
 
 void bind_adam_options(py::module_& m) {
-    py::class_<AdamOptions>(m, "AdamOptions",
+    ValueClass<AdamOptions>(m, "AdamOptions",
                             "The published schedule. Keyword arguments set fields.")
-        .def(py::init(&options_from<AdamOptions>))
+        .def_options()
         .def_readwrite("epochs", &AdamOptions::epochs, ">= 1")
         .def_readwrite("batch", &AdamOptions::batch, "Pairs, >= 1.")
         .def_readwrite("learning_rate", &AdamOptions::learning_rate,
@@ -42,22 +45,26 @@ void bind_adam_options(py::module_& m) {
         .def_readwrite("fine_from", &AdamOptions::fine_from,
                        "Share of all steps at which stage 2 begins, in [0, 1].")
         .def_readwrite("translation_scales", &AdamOptions::translation_scales,
-                       "Scales of Eq. (translation), 1 to 3.");
+                       "Scales of Eq. (translation), 1 to 3.")
+        .def("validate", &AdamOptions::validate,
+             "Raises ValueError naming the field, its value and the allowed range.")
+        .as_value();
 }
 
 void bind_tolerance(py::module_& m) {
-    py::class_<Tolerance>(m, "Tolerance",
+    ValueClass<Tolerance>(m, "Tolerance",
                           "The expected error up to which a calibration is trusted [px of the\n"
                           "reference when its width is 640 px].")
-        .def(py::init(&options_from<Tolerance>))
+        .def_options()
         .def_readwrite("median", &Tolerance::median, "Over the footage's own depths, > 0.")
         .def_readwrite("p95", &Tolerance::p95, "Of 95 % of them, > 0.")
         .def_static("parse", &Tolerance::parse, py::arg("option"), py::arg("text"),
                     "'2,5' as an option gives it, or '2': 95 % within 2.5 times the median. "
-                    "InputError names the option.");
+                    "InputError names the option.")
+        .as_value();
 }
 
-void bind_cameras(py::class_<CalibrationOptions>& options) {
+void bind_cameras(ValueClass<CalibrationOptions>& options) {
     options
         .def_readwrite("reference_camera", &CalibrationOptions::reference_camera,
                        "Known intrinsics, frozen, or None.")
@@ -84,11 +91,11 @@ void bind_cameras(py::class_<CalibrationOptions>& options) {
                        "the scale kept, and the rig has both. None: metric depth.");
 }
 
-void bind_flow_term(py::class_<CalibrationOptions>& options) {
-    def_word(options, "flow", &CalibrationOptions::flow, "flow",
-             "The flow term: 'auto' (where nothing is searched), 'on' (after a search too) or "
-             "'off'.");
+void bind_flow_term(ValueClass<CalibrationOptions>& options) {
     options
+        .def_word("flow", &CalibrationOptions::flow, "flow",
+                  "The flow term: 'auto' (where nothing is searched), 'on' (after a search too) or "
+                  "'off'.")
         .def_readwrite("flow_weight", &CalibrationOptions::flow_weight,
                        "lambda of Eq. (total_loss); > 0.")
         .def_readwrite("flow_rounds", &CalibrationOptions::flow_rounds,
@@ -123,9 +130,9 @@ void bind_calibration_options(py::module_& m) {
     bind_search_options(m);
     bind_adam_options(m);
     bind_tolerance(m);
-    py::class_<CalibrationOptions> options(m, "CalibrationOptions",
+    ValueClass<CalibrationOptions> options(m, "CalibrationOptions",
                                            "Options of calibrate(). Keyword arguments set fields.");
-    options.def(py::init(&options_from<CalibrationOptions>))
+    options.def_options()
         .def_readwrite("max_frames", &CalibrationOptions::max_frames,
                        "Pairs used, spread over the footage; >= 1.")
         .def_readwrite("seed", &CalibrationOptions::seed, "Seed of the frame choice.")
@@ -139,7 +146,7 @@ void bind_calibration_options(py::module_& m) {
     bind_flow_term(options);
     bind_cameras(options);
     options
-        .def_property(
+        .def_seen(
             "mount", [](const CalibrationOptions& o) { return Mount::word(o.mount); },
             [](CalibrationOptions& o, const std::string& word) {
                 o.mount = Mount::parse("mount", word);
@@ -148,11 +155,13 @@ void bind_calibration_options(py::module_& m) {
             "'upright', degrees clockwise as '90', 'mirrored', or both as 'mirrored-90'.")
         .def_readwrite("search", &CalibrationOptions::search, "SearchOptions.")
         .def_readwrite("tolerance", &CalibrationOptions::tolerance, "Tolerance.");
-    def_word(options, "solver", &CalibrationOptions::solver, "solver",
-             "'ceres', or 'adam' as published, which searches nothing.");
-    options.def_readwrite("adam", &CalibrationOptions::adam, "AdamOptions.")
+    options
+        .def_word("solver", &CalibrationOptions::solver, "solver",
+                  "'ceres', or 'adam' as published, which searches nothing.")
+        .def_readwrite("adam", &CalibrationOptions::adam, "AdamOptions.")
         .def("validate", &CalibrationOptions::validate,
-             "Raises ValueError naming the field, its value and the allowed range.");
+             "Raises ValueError naming the field, its value and the allowed range.")
+        .as_value();
     bind_option_words(m);
 }
 

@@ -3,6 +3,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "json.hpp"
+#include "value_class.hpp"
 #include "xcalib/calibrate.hpp"
 
 namespace xcalib {
@@ -11,7 +12,7 @@ namespace {
 namespace py = pybind11;
 
 void bind_level_report(py::module_& m) {
-    py::class_<LevelReport>(m, "LevelReport", "One solve: a stage at a level of the pyramid.")
+    ValueClass<LevelReport>(m, "LevelReport", "One solve: a stage at a level of the pyramid.")
         .def_readonly("factor", &LevelReport::factor, "Reduction of the working images.")
         .def_readonly("stage", &LevelReport::stage, "1 or 2, as in the paper.")
         .def_readonly("width", &LevelReport::width, "[px]")
@@ -27,11 +28,12 @@ void bind_level_report(py::module_& m) {
         .def_readonly("condition_number", &LevelReport::condition_number,
                       "Condition number of the normal equations, columns scaled to unit norm.")
         .def_readonly("seconds", &LevelReport::seconds, "[s]")
-        .def_readonly("stopped", &LevelReport::stopped, "Why it stopped.");
+        .def_readonly("stopped", &LevelReport::stopped, "Why it stopped.")
+        .as_value();
 }
 
 void bind_candidate_report(py::module_& m) {
-    py::class_<CandidateReport>(m, "CandidateReport",
+    ValueClass<CandidateReport>(m, "CandidateReport",
                                 "A peak of the search, and what became of it.")
         .def_readonly("score", &CandidateReport::score, "Contrast against the typical value.")
         .def_readonly("correlation", &CandidateReport::correlation,
@@ -39,11 +41,12 @@ void bind_candidate_report(py::module_& m) {
         .def_readonly("overlap", &CandidateReport::overlap, "Overlap of both images' edges.")
         .def_readonly("refined_nec", &CandidateReport::refined_nec, "After the coarse levels.")
         .def_readonly("found", &CandidateReport::found, "Rig, by the search.")
-        .def_readonly("refined", &CandidateReport::refined, "Rig, after the coarse levels.");
+        .def_readonly("refined", &CandidateReport::refined, "Rig, after the coarse levels.")
+        .as_value();
 }
 
 void bind_lens_report(py::module_& m) {
-    py::class_<LensReport>(m, "LensReport", "What k1 and k2 of the source's lens are worth.")
+    ValueClass<LensReport>(m, "LensReport", "What k1 and k2 of the source's lens are worth.")
         .def_readonly("tried", &LensReport::tried, "Was a lens fitted?")
         .def_readonly("coefficients", &LensReport::coefficients,
                       "Kept: 0, 1 (k1) or 2 (k1 and k2).")
@@ -52,20 +55,22 @@ void bind_lens_report(py::module_& m) {
             "In NEC by the last one that was tried, of frames that the fit has not seen:\n"
             "the mean; of all frames where they gain too little to look further.")
         .def_readonly("gain_deviation", &LensReport::gain_deviation,
-                      "The standard deviation of that mean; 0 of all frames.");
+                      "The standard deviation of that mean; 0 of all frames.")
+        .as_value();
 }
 
 void bind_adam_step(py::module_& m) {
-    py::class_<AdamStep>(m, "AdamStep", "Before a step of Adam is taken: means over its batch.")
+    ValueClass<AdamStep>(m, "AdamStep", "Before a step of Adam is taken: means over its batch.")
         .def_readonly("learning_rate", &AdamStep::learning_rate, "Learning rate of the step.")
         .def_readonly("image", &AdamStep::image, "Eq. (image_loss).")
         .def_readonly("flow", &AdamStep::flow, "Eq. (flow_loss), in half widths of the reference.")
         .def_readonly("prior", &AdamStep::prior, "Eq. (camera_regularization).")
-        .def_readonly("total", &AdamStep::total, "Eq. (total_loss).");
+        .def_readonly("total", &AdamStep::total, "Eq. (total_loss).")
+        .as_value();
 }
 
 void bind_lag_report(py::module_& m) {
-    py::class_<LagFit>(m, "LagFit", "The fit with the sources some frames later, refitted.")
+    ValueClass<LagFit>(m, "LagFit", "The fit with the sources some frames later, refitted.")
         .def_readonly("lag", &LagFit::lag,
                       "That a source is later than its own frame [source frames].")
         .def_readonly("frames", &LagFit::frames, "References that have such a source.")
@@ -75,8 +80,9 @@ void bind_lag_report(py::module_& m) {
         .def_readonly("gain", &LagFit::gain,
                       "NEC of a frame above the same with its own source, there: mean.")
         .def_readonly("error", &LagFit::error, "Standard error of the gain.")
-        .def_readonly("rig", &LagFit::rig, "Rig, refitted.");
-    py::class_<LagReport>(m, "LagReport", "By how much the source is late beside its pairing.")
+        .def_readonly("rig", &LagFit::rig, "Rig, refitted.")
+        .as_value();
+    ValueClass<LagReport>(m, "LagReport", "By how much the source is late beside its pairing.")
         .def_readonly("frames", &LagReport::frames,
                       "[source frames]; 0 too where the fits do not show it.")
         .def_readonly("change", &LagReport::change,
@@ -84,7 +90,8 @@ void bind_lag_report(py::module_& m) {
                       "where the halves differ.")
         .def_readonly("fits", &LagReport::fits,
                       "LagFit, by rising lag; none where the footage is no sequence.")
-        .def("line", &LagReport::line, "How the fits compare.");
+        .def("line", &LagReport::line, "How the fits compare.")
+        .as_value();
 }
 
 }  // namespace
@@ -95,7 +102,7 @@ void bind_calibration_report(py::module_& m) {
     bind_lens_report(m);
     bind_adam_step(m);
     bind_lag_report(m);
-    py::class_<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
+    ValueClass<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
         .def_readonly("verdict", &CalibrationReport::verdict, "Verdict.")
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
         .def_readonly("message", &CalibrationReport::message,
@@ -152,7 +159,9 @@ void bind_calibration_report(py::module_& m) {
         .def("full", &CalibrationReport::full, "A table.")
         .def(
             "to_dict", [](const CalibrationReport& report) { return object_of(json_of(report)); },
-            "Plain lists and numbers, as for JSON.");
+            "Plain lists and numbers, as for JSON.")
+        .keep_unseen(&CalibrationReport::time)
+        .as_value();
 }
 
 }  // namespace xcalib

@@ -5,7 +5,7 @@
 
 #include <sstream>
 
-#include "bindings.hpp"
+#include "value_class.hpp"
 #include "xcalib/mount.hpp"
 #include "xcalib/rig_file.hpp"
 
@@ -24,6 +24,14 @@ Matrix numbers_of(const char* name, const py::object& object, const char* expect
         throw py::value_error(std::string(name) + " is " + std::string(py::repr(object)) +
                               ", expected " + expected);
     }
+}
+
+// Read-only, for a copy that is changed changes no camera.
+template <class Matrix>
+py::array frozen(const Matrix& matrix) {
+    const py::array out = py::cast(matrix);
+    out.attr("setflags")(py::arg("write") = false);
+    return out;
 }
 
 Rig make_rig(const Pinhole& reference, const Pinhole& source, const py::object& R,
@@ -52,7 +60,7 @@ std::string text_of(const Pinhole& c) {
 }
 
 void bind_pinhole(py::module_& m) {
-    py::class_<Pinhole>(m, "Pinhole",
+    ValueClass<Pinhole>(m, "Pinhole",
                         R"(A pinhole camera, Eq. (intrinsic) of the paper, and its lens.
 
 Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be set.)")
@@ -82,7 +90,9 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
         .def_readwrite("cy", &Pinhole::cy, "[px]")
         .def_readwrite("skew", &Pinhole::skew, "[px]")
         .def_readwrite("lens", &Pinhole::lens, "Lens between (X/Z, Y/Z) and K.")
-        .def_property_readonly("K", &Pinhole::K, "(3, 3) float64 intrinsic matrix [px].")
+        .def_property_readonly(
+            "K", [](const Pinhole& c) { return frozen(c.K()); },
+            "(3, 3) float64 intrinsic matrix [px], read-only.")
         .def_property_readonly(
             "hfov_deg", [](const Pinhole& c) { return c.hfov() / kDegree; },
             "Horizontal field of view, 2 atan(width / (2 fx)) without a lens [deg].")
@@ -91,11 +101,12 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
             "Vertical field of view [deg].")
         .def("resized", &Pinhole::resized, py::arg("width"), py::arg("height"),
              "The same camera behind an image of another size [px].")
-        .def("__repr__", &text_of);
+        .def("__repr__", &text_of)
+        .as_value(true);
 }
 
 void bind_relative_depth(py::module_& m) {
-    py::class_<RelativeDepth>(m, "RelativeDepth",
+    ValueClass<RelativeDepth>(m, "RelativeDepth",
                               R"(Relative inverse depth r in metres: D = 1 / (scale r + shift).
 
 A rig that was calibrated with it has its translation in the unit that the scale stands for.)")
@@ -108,38 +119,40 @@ A rig that was calibrated with it has its translation in the unit that the scale
              "Raises ValueError where the scale is not > 0, or a value not finite.")
         .def_readonly("scale", &RelativeDepth::scale, "> 0")
         .def_readonly("shift", &RelativeDepth::shift, "[1/m], if the scale is of metres.")
-        .def("__repr__", [](const RelativeDepth& r) {
-            std::ostringstream out;
-            out << "RelativeDepth(scale=" << r.scale << ", shift=" << r.shift << ")";
-            return out.str();
-        });
+        .def("__repr__",
+             [](const RelativeDepth& r) {
+                 std::ostringstream out;
+                 out << "RelativeDepth(scale=" << r.scale << ", shift=" << r.shift << ")";
+                 return out.str();
+             })
+        .as_value(true);
 }
 
 void bind_rig_pose(py::class_<Rig>& rig) {
     rig.def_property(
-           "R", &Rig::R,
+           "R", [](const Rig& rig) { return frozen(rig.R()); },
            [](Rig& rig, const Eigen::Matrix3d& R) {
                rig.source_from_reference.rotation =
                    make_rig(rig.reference, rig.source, py::cast(R), py::none())
                        .source_from_reference.rotation;
            },
-           "(3, 3) float64 rotation, source_from_reference.")
+           "(3, 3) float64 rotation, source_from_reference; read-only, but set whole.")
         .def_property(
-            "t", [](const Rig& rig) { return rig.t(); },
+            "t", [](const Rig& rig) { return frozen(rig.t()); },
             [](Rig& rig, const Eigen::Vector3d& t) {
                 rig.source_from_reference.translation =
                     make_rig(rig.reference, rig.source, py::none(), py::cast(t)).t();
             },
-            "(3,) float64 translation, source_from_reference [m].")
+            "(3,) float64 translation, source_from_reference [m]; read-only, but set whole.")
         .def_property_readonly(
             "quaternion_wxyz",
             [](const Rig& rig) {
                 const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
-                return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
+                return frozen(Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()));
             },
             "(4,) float64 unit quaternion of R.")
         .def_property_readonly(
-            "infinite_homography", &infinite_homography,
+            "infinite_homography", [](const Rig& rig) { return frozen(infinite_homography(rig)); },
             "(3, 3) float64, K_S R K_R^-1: where points at infinity go, lenses aside.");
 }
 
@@ -192,6 +205,24 @@ void bind_rig(py::module_& m) {
                 << ", t=[" << rig.t().transpose() << "])";
             return out.str();
         });
+    rig.def(
+        "_repr_html_",
+        [](const py::object& self) {
+            return py::module_::import("xcalib.notebook").attr("rig_html")(self);
+        },
+        "What a notebook shows: where the source camera looks, on the reference's image.");
+    // By the text of its file, which has all of it, to the last bit; a rig of a report that none
+    // was found for has none.
+    rig.def(py::pickle(
+        [](const Rig& rig) {
+            const bool is_set = rig.reference.width > 0;
+            return py::make_tuple(is_set ? rig_text(rig) : "");
+        },
+        [](const py::tuple& state) {
+            const auto text = state[0].cast<std::string>();
+            return text.empty() ? Rig{} : rig_of_text(text);
+        }));
+    def_copies(rig);
 }
 
 }  // namespace

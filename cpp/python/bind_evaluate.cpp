@@ -35,6 +35,13 @@ void bind_evaluation(py::module_& m) {
                 return frames;
             },
             "Registered and unregistered scores of each frame.")
+        .def_property_readonly(
+            "given",
+            [](const Evaluation& e) -> py::object {
+                if (!e.given) return py::none();
+                return object_of(json_of(*e.given));
+            },
+            "The same of images that another method registered, or None.")
         .def("table", &Evaluation::table, "The scores as text, one line each.");
 }
 
@@ -50,14 +57,18 @@ void bind_evaluate(py::module_& m) {
         .def(
             "add",
             [](Evaluator& evaluator, const py::object& reference, const py::object& source,
-               const py::object& depth) {
+               const py::object& depth, const py::object& given) {
                 const Held r = image_of("reference", reference), s = image_of("source", source);
                 const Held d = depth_of("depth", depth);
+                const Held g = given.is_none() ? Held{} : image_of("given", given);
                 const py::gil_scoped_release released;
-                evaluator.add(r.view, s.view, d.view);
+                evaluator.add(r.view, s.view, d.view, given.is_none() ? nullptr : &g.view);
             },
             py::arg("reference"), py::arg("source"), py::arg("depth"),
-            "Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m].")
+            py::arg("given") = py::none(),
+            "Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m]. "
+            "given: "
+            "the source as another method registers it, of the reference's aspect.")
         .def("result", &Evaluator::result, "The Evaluation; ValueError without a frame.");
 }
 

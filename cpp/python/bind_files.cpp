@@ -6,10 +6,11 @@
 #include "bindings.hpp"
 #include "from_python.hpp"
 #include "xcalib/rig_file.hpp"
+#include "xcalib/stream/arrays.hpp"
 #include "xcalib/stream/files.hpp"
-#include "xcalib/stream/npy.hpp"
 #include "xcalib/stream/outputs.hpp"
 #include "xcalib/stream/tiff.hpp"
+#include "xcalib/stream/video_length.hpp"
 #include "xcalib/threads.hpp"
 
 namespace xcalib {
@@ -45,10 +46,32 @@ void bind_files(py::module_& m) {
         py::arg("file"),
         "The bytes of a file: InputError where it is none, as a pipe, or larger than 1 GiB.");
     m.def(
-        "read_npy",
-        [](const Path& file) { return array_of(unlocked([&] { return read_npy(file); })); },
-        py::arg("file"),
-        "(h, w) float32 of a .npy file of one channel of floats; DecodeError where it is none.");
+        "read_array",
+        [](const Path& file, bool is_image) -> py::object {
+            const ArrayKind kind = is_image ? ArrayKind::image : ArrayKind::depth;
+            const auto array = unlocked([&] { return read_array(file, kind); });
+            if (!array) return py::none();
+            return array_of(*array);
+        },
+        py::arg("file"), py::arg("is_image"),
+        R"(What a .npy, .npz or .pfm file has, uint16 or float32; None where the suffix is another.
+
+(h, w) or, of an image, which may be uint8, (h, w, 3). Raises DecodeError where it is damaged,
+InputError where it is another array.)");
+    m.def(
+        "with_full_page_first",
+        [](const std::string& data, const std::string& name) {
+            std::string file = data;
+            put_full_page_first(file, name);
+            return py::bytes(file);
+        },
+        py::arg("data"), py::arg("name"),
+        "The bytes of a TIFF file with the page of full size first, as of one that begins with a "
+        "thumbnail; InputError, naming the file, where several pages are of that size.");
+    m.def("video_line", &video_line, py::arg("name"), py::arg("times"), py::arg("announced"),
+          py::arg("rate"),
+          "A line where fewer frames were decoded than the header announces, though they reach to "
+          "the end; else ''. InputError where the file ends early.");
     m.def(
         "tiff_pixel_type",
         [](const py::bytes& data) { return tiff_pixel_type(static_cast<std::string_view>(data)); },

@@ -1,15 +1,15 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "compared.hpp"
-#include "options.hpp"
+#include "value_class.hpp"
 #include "xcalib/flow.hpp"
 
 namespace xcalib {
 namespace {
 
-py::tuple flow_of(const py::object& reference, const py::object& warped, const py::object& mask,
+py::tuple flow_of(const py::object& reference, const py::object& warped, const py::object& valid,
                   const FlowOptions& options, int num_threads) {
-    const Compared c(reference, warped, mask);
+    const Compared c(reference, warped, valid, valid_of);
     const int width = c.reference.width, height = c.reference.height;
     py::array_t<float> flow({height, width, 2}), confidence({height, width});
     float* const vectors = flow.mutable_data();
@@ -33,8 +33,8 @@ py::tuple flow_of(const py::object& reference, const py::object& warped, const p
 }  // namespace
 
 void bind_flow(py::module_& m) {
-    py::class_<FlowOptions>(m, "FlowOptions", "Options of patch_flow().")
-        .def(py::init(&options_from<FlowOptions>))
+    ValueClass<FlowOptions>(m, "FlowOptions", "Options of patch_flow().")
+        .def_options()
         .def_readwrite("step", &FlowOptions::step,
                        "Distance of patches on their grid [px], odd, >= 3.")
         .def_readwrite("patch", &FlowOptions::patch,
@@ -43,14 +43,15 @@ void bind_flow(py::module_& m) {
         .def_readwrite("max_shift", &FlowOptions::max_shift,
                        "Farthest shift that the coarsest level looks for [px], >= 1.")
         .def("validate", &FlowOptions::validate,
-             "Raises ValueError naming the field, its value and the allowed range.");
+             "Raises ValueError naming the field, its value and the allowed range.")
+        .as_value();
 
     m.def("patch_flow", &flow_of, py::arg("reference"), py::arg("warped"),
-          py::arg("mask") = py::none(), py::arg("options") = FlowOptions{},
+          py::arg("valid") = py::none(), py::arg_v("options", FlowOptions{}, "FlowOptions()"),
           py::arg("num_threads") = 0,
           R"(Residual flow between a reference and a warped source of another modality.
 
-Images (H, W) or (H, W, 3) of one size; mask (H, W), nonzero where the warped source is valid.
+Images (H, W) or (H, W, 3) of one size; valid (H, W), nonzero where the warped source is.
 Returns (flow, confidence): flow (H, W, 2) float32 [px], what reference pixel p shows is found at
 p + flow[p] in the warped source; confidence (H, W) float32 in [0, 1]. Both are linear between the
 grid's points. num_threads: 0 uses every core; the result does not depend on it.

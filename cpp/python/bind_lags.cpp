@@ -6,6 +6,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "from_python.hpp"
+#include "xcalib/footage/joined.hpp"
 #include "xcalib/stream/neighbours.hpp"
 
 namespace xcalib {
@@ -41,15 +42,13 @@ void bind_lags(py::module_& m) {
            const std::map<int, py::sequence>& sources, const Rig& rig,
            const CalibrationOptions& options) {
             const HeldList r = list_of("reference", references, image_of);
-            const HeldList d = list_of(
-                "depth", depths,
-                [](const std::string& name, const py::object& map) { return depth_of(name, map); });
+            const HeldList d = list_of("depth", depths, metric_depth_of);
             const HeldLags s(sources);
             const py::gil_scoped_release released;
             return fit_lags(r.views, d.views, s.lags, rig, options);
         },
         py::arg("references"), py::arg("depths"), py::arg("sources"), py::arg("rig"),
-        py::arg("options") = CalibrationOptions{},
+        py::arg_v("options", CalibrationOptions{}, "CalibrationOptions()"),
         R"(Whether the source is late by whole frames: a LagReport.
 
 references, depths: a dozen of the frames that rig was fitted to, with options, as calibrate() takes
@@ -63,9 +62,7 @@ and the NEC of the same references compared.)");
            const CalibrationOptions& options, const std::function<void(double)>& progress) {
             const HeldList r = list_of("reference", references, image_of);
             const HeldList s = list_of("source", sources, image_of);
-            const HeldList d = list_of(
-                "depth", depths,
-                [](const std::string& name, const py::object& map) { return depth_of(name, map); });
+            const HeldList d = list_of("depth", depths, metric_depth_of);
             const py::gil_scoped_release released;
             return fit_lags({r.views, s.views, d.views, std::move(partners)}, all_sources, rig,
                             options, progress);
@@ -84,6 +81,22 @@ the share of the frames read.)");
         py::arg("result"), py::arg("lag"), py::arg("offset"), py::arg("all_sources"),
         "Puts the report into the result, which is no longer trusted if the source is late beyond "
         "offset.");
+    m.def(
+        "distrust",
+        [](const std::string& line, CalibrationResult& result) { distrust(line, result); },
+        py::arg("line"), py::arg("result"),
+        "The result is not to be trusted, for the reason in the line; an empty one changes "
+        "nothing.");
+    m.def(
+        "joined_line",
+        [](const py::object& images, const std::string& name) {
+            const HeldList held = list_of("image", images, image_of);
+            const py::gil_scoped_release released;
+            return joined_line(held.views, name);
+        },
+        py::arg("images"), py::arg("name"),
+        "A line where most of the images look like two joined at their middle, one above the other "
+        "or side by side; else ''. name: REFERENCE or SOURCE.");
     m.def(
         "frames_later",
         [](const Stream& all_sources, const std::vector<int>& partners, int lag) {

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "bindings.hpp"
+#include "value_class.hpp"
 #include "xcalib/lens.hpp"
 
 namespace xcalib {
@@ -68,6 +68,18 @@ before the lens, and what the intrinsic matrix takes to pixels after it.)")
             py::arg("points"), "(N, 2) points that the lens shows at (N, 2); NaN where none.")
         .def(
             "__eq__", [](const Lens& a, const Lens& b) { return a == b; }, py::is_operator())
+        .def(py::pickle(
+            [](const Lens& lens) {
+                return py::make_tuple(std::string(name_of(lens.model())), lens.coefficients());
+            },
+            [](const py::tuple& state) {
+                return make_lens(state[0].cast<std::string>(),
+                                 state[1].cast<std::vector<double>>());
+            }))
+        .def("__copy__", [](const Lens& lens) { return Lens(lens); })
+        .def(
+            "__deepcopy__", [](const Lens& lens, const py::dict&) { return Lens(lens); },
+            py::arg("memo"))
         .def("__hash__", [](const Lens& lens) { return py::hash(py::str(Lens::word(lens))); })
         .def("__repr__", [](const Lens& lens) {
             const py::object coefficients = py::cast(lens.coefficients());

@@ -1,5 +1,7 @@
 #include <pybind11/stl.h>
 
+#include <optional>
+
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "compared.hpp"
@@ -31,8 +33,7 @@ void def_metric(py::module_& m, const char* name, Metric metric, const char* doc
         py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(), doc);
 }
 
-// The same that depends on the span of the gray values: those of integers lie in [0, 1], and
-// float32 images are expected to.
+// The same that depends on the span of the gray values.
 template <class Metric>
 void def_ranged(py::module_& m, const char* name, Metric metric, const char* doc) {
     m.def(
@@ -40,8 +41,9 @@ void def_ranged(py::module_& m, const char* name, Metric metric, const char* doc
         [metric](const py::object& reference, const py::object& registered, const py::object& mask,
                  const std::optional<double>& data_range) {
             const Compared c(reference, registered, mask);
+            const double range = c.range(data_range);
             const py::gil_scoped_release released;
-            return metric(c.reference, c.registered, c.mask.data, data_range.value_or(1.0));
+            return metric(c.reference, c.registered, c.mask.data, range);
         },
         py::arg("reference"), py::arg("registered"), py::arg("mask") = py::none(),
         py::arg("data_range") = py::none(), doc);
@@ -69,20 +71,25 @@ void bind_metrics(py::module_& m) {
           py::arg("floor") = "none",
           R"(Normalized Edge Correlation, Eq. (nec), in [0, 1]; NaN where no edge is left.
 
-Images (H, W) or (H, W, 3) of one size; mask (H, W), nonzero where valid. floor: "none" (upper clamp
+Images (H, W) or (H, W, 3) of one size, colour as blue-green-red; mask (H, W) as
+Registrar.register() gives it: 0 where valid. floor: "none" (upper clamp
 only, as the authors' code) or "printed" (Eq. (gradient_clamping) as printed).)");
     def_metric(m, "gc", &gc,
                "Gradient correlation: mean over x and y of the zero-mean normalized correlation "
                "of the absolute forward differences, in [-1, 1]. Images and mask as in nec().");
     def_metric(m, "ncc", &ncc,
                "Zero-mean normalized cross correlation, in [-1, 1]. Images and mask as in nec().");
-    def_metric(m, "rmse", &rmse,
-               "Root mean square error of gray values; integers scaled to [0, 1]. Images "
-               "and mask as in nec().");
+    def_ranged(
+        m, "rmse",
+        [](const Image& reference, const Image& registered, const std::uint8_t* valid,
+           double range) { return rmse(reference, registered, valid) / range; },
+        "Root mean square error of gray values, as a share of data_range. Images, mask and "
+        "data_range as in ssim().");
     def_ranged(m, "ssim", &ssim,
                "Structural similarity (Wang et al. 2004), Gaussian window of sigma 1.5 px, "
                "over pixels whose 11 x 11 window is valid. data_range: span of the gray "
-               "values, 1 by default. Images and mask as in nec().");
+               "values, by default that of the type of integers, and 1 for floats, which must "
+               "then lie in [0, 1]. Images and mask as in nec().");
     def_ranged(m, "psnr", &psnr,
                "Peak signal-to-noise ratio [dB], 20 log10(data_range / RMSE). Images, mask "
                "and data_range as in ssim().");

@@ -26,8 +26,9 @@ Files of the same stem belong together; if none is common, those with the same n
 names; if none is common either, their order decides. Raises InputError, naming what has no partner,
 where names agree only in part or the counts differ.)");
     m.def("times_of_names", &times_of_names, py::arg("names"),
-          "Seconds where every name holds one time since 1970 (19, 16 or 13 digits, or seconds "
-          "with a fraction) and they rise; None otherwise.");
+          "Seconds where every name holds one time since 1970 (19, 16 or 13 digits, seconds with a "
+          "fraction, SEC_NSEC, or a date and a time of day with a fraction) and they rise; None "
+          "otherwise.");
 }
 
 void bind_pairing_classes(py::module_& m) {
@@ -42,6 +43,8 @@ void bind_pairing_classes(py::module_& m) {
             "dropped",
             [](const Pairing& p) { return std::pair(p.dropped_references, p.dropped_sources); },
             "Frames of either stream without a partner.")
+        .def_readonly("alone", &Pairing::alone,
+                      "Files without a partner, by name, a few of them; '' where there are none.")
         .def_readonly("gap", &Pairing::gap, "Median distance in time, the offset allowed for [s].")
         .def_readonly("offset", &Pairing::offset, "By how much the source's clock is late [s].")
         .def_readonly("lag", &Pairing::lag,

@@ -96,6 +96,22 @@ refuses integers. Raises ValueError where the rig or an option is not valid.)")
         .def(py::init(&make_registrar), py::arg("rig"), py::arg("num_threads") = 0,
              py::arg("nearest") = false, py::arg("occlusion") = "mark",
              py::arg("depth_scale") = py::none())
+        .def(py::pickle(
+            [](const Registrar& registrar) {
+                const RegistrarOptions& o = registrar.options();
+                return py::make_tuple(registrar.rig(), o.num_threads, o.nearest,
+                                      std::string(word_of(o.occlusion)), o.depth_scale);
+            },
+            [](const py::tuple& s) {
+                return Registrar(s[0].cast<Rig>(),
+                                 {s[1].cast<int>(), s[2].cast<bool>(),
+                                  value_of<Occlusion>("occlusion", s[3].cast<std::string>()),
+                                  s[4].cast<double>()});
+            }))
+        .def("__repr__",
+             [](const Registrar& registrar) {
+                 return "Registrar(" + std::string(py::repr(py::cast(registrar.rig()))) + ")";
+             })
         .def_property_readonly("rig", &Registrar::rig, "A copy of the rig.",
                                py::return_value_policy::copy)
         .def("map", &map, py::arg("depth"),
@@ -105,7 +121,8 @@ refuses integers. Raises ValueError where the rig or an option is not valid.)")
              py::arg("out") = py::none(), py::arg("mask") = py::none(),
              R"(The source on the reference grid, and what each pixel is worth.
 
-source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth: (h, w) float32
+source: (h, w) or (h, w, 3) uint8 | uint16 | float32 (float64 is converted to it) of the rig's
+source size; depth: (h, w) float32
 [m], or uint16 if depth_scale was given, of the reference's aspect. out, mask: contiguous arrays to
 write the results to, which overlap no other; else new ones are made, which for large
 images takes as long as filling them. Returns (image, mask): image (H, W[, 3]) in the source's

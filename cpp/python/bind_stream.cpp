@@ -123,7 +123,9 @@ may read.)")
                 stream.times = std::move(times);
             },
             "(N,) seconds of the frames, never falling; None where unknown. Each stream has its "
-            "clock.");
+            "clock.")
+        .def_readwrite("said", &Stream::said,
+                       "For the user: what of it was not used, or is missing, in a line, or ''.");
     py::class_<Picked, Stream, py::smart_holder>(m, "Picked", "Some frames of a stream, in order.")
         .def(py::init<StreamPointer, std::vector<int>>(), py::arg("stream"), py::arg("indices"));
     py::class_<Half, Stream, py::smart_holder>(
@@ -141,9 +143,19 @@ may read.)")
         py::arg("file"),
         "(width, height) of a PNG or JPEG file by its header; None of others, and where it is not "
         "whole.");
+    m.def(
+        "times_beside",
+        [](const std::vector<Path>& files, Stream& stream) {
+            return times_beside(files, stream, stream.said);
+        },
+        py::arg("files"), py::arg("stream"), Unlocked(),
+        "Times of timestamps.csv or timestamps.txt beside the files of a stream, None where there "
+        "is "
+        "none; a table without names that has more or fewer lines is not used, and stream.said "
+        "says so.");
     m.def("read_times", &read_times, py::arg("table"), py::arg("stream"), Unlocked(),
-          "Seconds of the frames of a stream from a file of `name timestamp` lines, see "
-          "times_of_table().");
+          "Seconds of the frames of a stream from a file of `name timestamp` lines, or of as many "
+          "times as frames, in their order.");
     m.def(
         "scalar_sources",
         [](StreamPointer images, const std::string& colormap) {

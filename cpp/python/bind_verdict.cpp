@@ -1,4 +1,7 @@
+#include <pybind11/stl.h>
+
 #include "bindings.hpp"
+#include "value_class.hpp"
 #include "xcalib/verdict.hpp"
 
 namespace xcalib {
@@ -6,7 +9,7 @@ namespace xcalib {
 namespace py = pybind11;
 
 void bind_verdict(py::module_& m) {
-    py::class_<ExpectedError>(
+    ValueClass<ExpectedError>(
         m, "ExpectedError",
         "How far the registered source is expected to lie from where it belongs [px of the\n"
         "reference when its width is 640 px].")
@@ -16,11 +19,8 @@ void bind_verdict(py::module_& m) {
              [](const ExpectedError& error) {
                  return py::iter(py::make_tuple(error.median, error.p95));
              })
-        .def("__repr__", [](const ExpectedError& error) {
-            return "ExpectedError(median=" + std::string(py::str(py::float_(error.median))) +
-                   ", p95=" + std::string(py::str(py::float_(error.p95))) + ")";
-        });
-    py::class_<Verdict, std::shared_ptr<Verdict>>(
+        .as_value();
+    ValueClass<Verdict, std::shared_ptr<Verdict>>(
         m, "Verdict", "Is a calibration to be trusted, and how far off is it?")
         .def_readonly("trusted", &Verdict::trusted,
                       "Found, plausible, and the expected error within the tolerance.")
@@ -44,7 +44,20 @@ void bind_verdict(py::module_& m) {
         .def("line", &Verdict::line, "Reason and advice.")
         .def("error_at", &Verdict::error_at, py::arg("depth"),
              "ExpectedError at a depth [m], in proportion to inverse depth between those of\n"
-             "by_depth; NaN where there is none, or the depth is not positive.");
+             "by_depth; NaN where there is none, or the depth is not positive.")
+        .keep_as(
+            [](const Verdict& verdict) {
+                std::vector<std::array<double, 3>> rows;
+                for (const ErrorAtDepth& row : verdict.by_depth)
+                    rows.push_back({row.depth, row.error.median, row.error.p95});
+                return py::cast(rows);
+            },
+            [](Verdict& verdict, const py::object& kept) {
+                for (const auto& [depth, median, p95] :
+                     kept.cast<std::vector<std::array<double, 3>>>())
+                    verdict.by_depth.push_back({depth, {median, p95}});
+            })
+        .as_value();
 }
 
 }  // namespace xcalib

@@ -46,8 +46,10 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_choose(m);
     xcalib::bind_false_colour(m);
 
+    xcalib::bind_flir(m);
     xcalib::bind_plane_depth(m);
     xcalib::bind_fit_plane(m);
+    xcalib::bind_depth_units(m);
     xcalib::bind_complete_depth(m);
     xcalib::bind_steady_depth(m);
 
@@ -64,4 +66,6 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_describe(m);
     xcalib::bind_documents(m);
     xcalib::bind_overlay(m);
+
+    py::module_::import("xcalib.wrong_calls").attr("explain_in")(m);
 }

@@ -24,8 +24,10 @@ void bind_fingerprint(pybind11::module_& m);
 void bind_choose(pybind11::module_& m);
 void bind_false_colour(pybind11::module_& m);
 
+void bind_flir(pybind11::module_& m);
 void bind_plane_depth(pybind11::module_& m);
 void bind_fit_plane(pybind11::module_& m);
+void bind_depth_units(pybind11::module_& m);
 void bind_complete_depth(pybind11::module_& m);
 void bind_steady_depth(pybind11::module_& m);
 

@@ -34,9 +34,11 @@ if TYPE_CHECKING:
         fit_lags,
     )
     from xcalib.choose import choose_frames
+    from xcalib.evaluation import evaluate
 
     __version__: str
 else:
+    IN_PYTHON = {"choose_frames": "choose", "evaluate": "evaluation"}
 
     def __getattr__(name: str) -> Any:
         """Import what a name stands for when it is first used: `xcalib --version` needs nothing."""
@@ -44,8 +46,8 @@ else:
             value = import_module("importlib.metadata").version("xcalib-rgbt")
         elif name in ("convert", "labels", "metrics"):
             value = import_module(f"xcalib.{name}")
-        elif name == "choose_frames":
-            value = import_module("xcalib.choose").choose_frames
+        elif name in IN_PYTHON:
+            value = getattr(import_module(f"xcalib.{IN_PYTHON[name]}"), name)
         elif name in __all__:
             value = getattr(import_module("xcalib._core"), name)
         else:
@@ -80,6 +82,7 @@ __all__ = [
     "calibrate",
     "choose_frames",
     "convert",
+    "evaluate",
     "fit_lags",
     "labels",
     "metrics",

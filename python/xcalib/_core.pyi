@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, overload
@@ -89,7 +89,7 @@ class Pinhole:
         """
     @property
     def K(self) -> NDArray[float64]:
-        """(3, 3) float64 intrinsic matrix [px]."""
+        """(3, 3) float64 intrinsic matrix [px], read-only."""
     @property
     def hfov_deg(self) -> float:
         """Horizontal field of view, 2 atan(width / (2 fx)) without a lens [deg]."""
@@ -173,9 +173,9 @@ class Rig:
     source: Pinhole
     """Pinhole whose images are registered."""
     R: NDArray[float64]
-    """(3, 3) float64 rotation, source_from_reference."""
+    """(3, 3) float64 rotation, source_from_reference; read-only, but set whole."""
     t: NDArray[float64]
-    """(3,) float64 translation, source_from_reference [m]."""
+    """(3,) float64 translation, source_from_reference [m]; read-only, but set whole."""
     relative_depth: RelativeDepth | None
     """RelativeDepth it was calibrated with, or None: metric depth."""
     source_mirrored: bool
@@ -282,6 +282,8 @@ class SearchOptions:
     """Peaks refined before one is chosen, >= 1."""
 
     def __init__(self, **kwargs: Any) -> None: ...
+    def validate(self) -> None:
+        """Raises ValueError naming the field, its value and the allowed range."""
 
 class AdamOptions:
     """The published schedule. Keyword arguments set fields."""
@@ -300,6 +302,9 @@ class AdamOptions:
     """Share of all steps at which stage 2 begins, in [0, 1]."""
     translation_scales: int
     """Scales of Eq. (translation), 1 to 3."""
+
+    def validate(self) -> None:
+        """Raises ValueError naming the field, its value and the allowed range."""
 
     def __init__(self, **kwargs: Any) -> None: ...
 
@@ -628,9 +633,9 @@ def draw_frames(count: int, max_frames: int, seed: int) -> list[int]:
     """Indices of max_frames of count frames, spread over all, drawn with seed; sorted."""
 
 def calibrate(
-    references: Sequence[NDArray[Any]],
-    sources: Sequence[NDArray[Any]],
-    depths: Sequence[NDArray[Any]],
+    references: Iterable[NDArray[Any]],
+    sources: Iterable[NDArray[Any]],
+    depths: Iterable[NDArray[Any]],
     initial: Rig | None = None,
     options: CalibrationOptions = ...,
     progress: Callable[[str, float], object] | None = None,
@@ -641,11 +646,12 @@ def calibrate(
 ) -> CalibrationResult:
     """Estimates the rig from footage and depth, without a target.
 
-    references, sources: sequences of (H, W) or (H, W, 3) uint8 | uint16 | float32 images,
-    pairs by index; depths: (h, w) float32 [m], any size of the reference's aspect, 0 / NaN /
-    inf unknown. initial: Rig to start from. progress: called with (stage, share of the work
-    done). flow: a provider as in xcalib.flow, for the flow term; None is the built-in patch
-    flow. Images are copied only where they are not contiguous and aligned.
+    references, sources: lists (or other iterables) of (H, W) or (H, W, 3) uint8 | uint16 |
+    float32 images, colour as blue-green-red, pairs by index; depths: (h, w) float32 [m], any
+    size of the reference's aspect, 0 / NaN / inf unknown. initial: Rig to start from.
+    progress: called with (stage, share of the work done). flow: a provider as in xcalib.flow,
+    for the flow term; None is the built-in patch flow. Images are copied only where they are
+    not contiguous and aligned.
 
     Raises ValueError, naming the frame, on unusable input. Not to converge is a result: see
     CalibrationResult.converged.
@@ -686,13 +692,13 @@ class Registrar:
     ) -> tuple[NDArray[Any], NDArray[uint8]]:
         """The source on the reference grid, and what each pixel is worth.
 
-        source: (h, w) or (h, w, 3) uint8 | uint16 | float32 of the rig's source size; depth:
-        (h, w) float32 [m], or uint16 if depth_scale was given, of the reference's aspect.
-        out, mask: contiguous arrays to write the results to, which overlap no other; else new
-        ones are made, which for large images takes as long as filling them. Returns (image,
-        mask): image (H, W[, 3]) in the source's dtype, 0 where not valid, unless marked as
-        occluded only; mask (H, W) uint8: 0 valid, 1 outside the source, 2 occluded, 3 no
-        depth. Raises ValueError with shapes and dtypes.
+        source: (h, w) or (h, w, 3) uint8 | uint16 | float32 (float64 is converted to it) of
+        the rig's source size; depth: (h, w) float32 [m], or uint16 if depth_scale was given,
+        of the reference's aspect. out, mask: contiguous arrays to write the results to, which
+        overlap no other; else new ones are made, which for large images takes as long as
+        filling them. Returns (image, mask): image (H, W[, 3]) in the source's dtype, 0 where
+        not valid, unless marked as occluded only; mask (H, W) uint8: 0 valid, 1 outside the
+        source, 2 occluded, 3 no depth. Raises ValueError with shapes and dtypes.
         """
 
 def nec(
@@ -703,9 +709,9 @@ def nec(
 ) -> float:
     """Normalized Edge Correlation, Eq. (nec), in [0, 1]; NaN where no edge is left.
 
-    Images (H, W) or (H, W, 3) of one size; mask (H, W), nonzero where valid. floor: "none"
-    (upper clamp only, as the authors' code) or "printed" (Eq. (gradient_clamping) as
-    printed).
+    Images (H, W) or (H, W, 3) of one size, colour as blue-green-red; mask (H, W) as
+    Registrar.register() gives it: 0 where valid. floor: "none" (upper clamp
+    only, as the authors' code) or "printed" (Eq. (gradient_clamping) as printed).
     """
 
 def gc(
@@ -721,10 +727,13 @@ def ncc(
     """Zero-mean normalized cross correlation, in [-1, 1]. Images and mask as in nec()."""
 
 def rmse(
-    reference: NDArray[Any], registered: NDArray[Any], mask: NDArray[Any] | None = None
+    reference: NDArray[Any],
+    registered: NDArray[Any],
+    mask: NDArray[Any] | None = None,
+    data_range: float | None = None,
 ) -> float:
-    """Root mean square error of gray values; integers scaled to [0, 1]. Images and mask as in
-    nec().
+    """Root mean square error of gray values, as a share of data_range. Images, mask and
+    data_range as in ssim().
     """
 
 def ssim(
@@ -734,8 +743,9 @@ def ssim(
     data_range: float | None = None,
 ) -> float:
     """Structural similarity (Wang et al. 2004), Gaussian window of sigma 1.5 px, over pixels
-    whose 11 x 11 window is valid. data_range: span of the gray values, 1 by default. Images
-    and mask as in nec().
+    whose 11 x 11 window is valid. data_range: span of the gray values, by default that of the
+    type of integers, and 1 for floats, which must then lie in [0, 1]. Images and mask as in
+    nec().
     """
 
 def psnr(
@@ -773,17 +783,17 @@ class FlowOptions:
 def patch_flow(
     reference: NDArray[Any],
     warped: NDArray[Any],
-    mask: NDArray[Any] | None = None,
+    valid: NDArray[Any] | None = None,
     options: FlowOptions = ...,
     num_threads: int = 0,
 ) -> tuple[NDArray[float32], NDArray[float32]]:
     """Residual flow between a reference and a warped source of another modality.
 
-    Images (H, W) or (H, W, 3) of one size; mask (H, W), nonzero where the warped source is
-    valid. Returns (flow, confidence): flow (H, W, 2) float32 [px], what reference pixel p
-    shows is found at p + flow[p] in the warped source; confidence (H, W) float32 in [0, 1].
-    Both are linear between the grid's points. num_threads: 0 uses every core; the result does
-    not depend on it. Raises ValueError with shapes and dtypes.
+    Images (H, W) or (H, W, 3) of one size; valid (H, W), nonzero where the warped source is.
+    Returns (flow, confidence): flow (H, W, 2) float32 [px], what reference pixel p shows is
+    found at p + flow[p] in the warped source; confidence (H, W) float32 in [0, 1]. Both are
+    linear between the grid's points. num_threads: 0 uses every core; the result does not
+    depend on it. Raises ValueError with shapes and dtypes.
     """
 
 def natural_order(names: Sequence[str]) -> list[int]:
@@ -802,8 +812,9 @@ def pair_files(
     """
 
 def times_of_names(names: Sequence[str]) -> list[float] | None:
-    """Seconds where every name holds one time since 1970 (19, 16 or 13 digits, or seconds with a
-    fraction) and they rise; None otherwise.
+    """Seconds where every name holds one time since 1970 (19, 16 or 13 digits, seconds with a
+    fraction, SEC_NSEC, or a date and a time of day with a fraction) and they rise; None
+    otherwise.
     """
 
 class OffsetEstimate:
@@ -881,6 +892,9 @@ class Pairing:
     @property
     def lag(self) -> int:
         """By how many of its frames the source is late beyond that."""
+    @property
+    def alone(self) -> str:
+        """Files without a partner, by name, a few of them; '' where there are none."""
     def line(self) -> str:
         """What happened, in one line."""
 
@@ -980,6 +994,44 @@ def recognise(images: Sequence[NDArray[Any]]) -> ColorMap | None:
     than one is better where the map is not a known one.
     """
 
+class FlirParts:
+    """What a radiometric JPEG of a FLIR camera has in it."""
+    @property
+    def thermal(self) -> bytes:
+        """The counts, uint16: an image file, or plain, row by row."""
+    @property
+    def width(self) -> int:
+        """Of the counts [px]."""
+    @property
+    def height(self) -> int:
+        """Of the counts [px]."""
+    @property
+    def is_file(self) -> bool:
+        """Whether the counts are an image file."""
+    @property
+    def big_endian(self) -> bool:
+        """The counts' order of bytes; in a PNG, that they are the wrong way."""
+    @property
+    def visible(self) -> bytes:
+        """An image file; empty where there is none."""
+    @property
+    def real_to_ir(self) -> float:
+        """Ratio of the fields of view, as the camera lays its images over each other."""
+    @property
+    def offset_x(self) -> float:
+        """Of the thermal image from the visible one's middle [px of it]."""
+    @property
+    def offset_y(self) -> float:
+        """The same, down."""
+    def celsius(self, counts: NDArray[Any]) -> NDArray[float32] | None:
+        """(H, W) float32, degrees Celsius of a black body; None where the file does not say."""
+
+def flir_parts(data: bytes, name: str) -> FlirParts | None:
+    """FlirParts of a JPEG, or None where it is not radiometric. DecodeError where damaged."""
+
+def plain_counts(parts: FlirParts) -> NDArray[Any]:
+    """(H, W) uint16 of counts that are no image file."""
+
 class PlaneDepth:
     """Road-plane prior: a flat road under the camera, all else far away.
 
@@ -1034,6 +1086,50 @@ def fit_plane(
     translation alike. rig: fitted with plane, where fits start. options: known cameras and
     threads are kept. progress: is called after each fit.
     """
+
+class DepthUnits:
+    """What the numbers of depth maps mean."""
+
+    scale: float | None
+    """Metres per unit of the numbers, of disparities px. None: 1/256 of the counts of a PNG, 1
+    of floats.
+    """
+    invalid: list[float]
+    """Numbers that mean unknown, besides those that are not above 0 or not finite, and the
+    largest count of 16 bits.
+    """
+    baseline: float
+    """Not 0: the numbers are disparities d [px] of cameras so far apart [m], and depth is focal
+    * baseline / (d + doffs).
+    """
+    focal: float
+    """[px]"""
+    doffs: float
+    """[px]"""
+
+    def __init__(self, **kwargs: Any) -> None: ...
+    def validate(self) -> None:
+        """Raises InputError naming the field, its value and the allowed range."""
+
+def depth_unit_of(word: str) -> float:
+    """Metres per unit of what --depth-unit says: m, cm, mm or 1/N. Raises InputError."""
+
+def metres_of(
+    numbers: NDArray[Any], units: DepthUnits, where: str, is_png: bool
+) -> NDArray[float32]:
+    """(h, w) float32 [m] of a map's numbers, uint16 or float32; 0 where unknown.
+
+    where names the map in messages; is_png: counts without a scale are of 1/256. Raises
+    InputError where the unit is not known.
+    """
+
+def units_line(numbers: NDArray[Any], units: DepthUnits, where: str, is_png: bool) -> str:
+    """A line on what a map is taken for: the range of its depth, its unit, the share that is
+    unknown.
+    """
+
+def depth_choices() -> str:
+    """What --depth may be, a line each; for the error where it is left out."""
 
 def completion_confidence() -> float:
     """Filled pixels below it stay unknown, unless asked for."""
@@ -1098,6 +1194,9 @@ class Evaluation:
     def unregistered(self) -> dict[str, float]:
         """The same of the source that is only resized."""
     @property
+    def given(self) -> dict[str, float] | None:
+        """The same of images that another method registered, or None."""
+    @property
     def gain_percent(self) -> dict[str, float]:
         """Change of each score by registration [%], NaN where undefined."""
     @property
@@ -1112,8 +1211,16 @@ class Evaluator:
         """width: the reference is reduced by the smallest integer that makes it at most this
         wide [px]. num_threads: 0 means all cores.
         """
-    def add(self, reference: NDArray[Any], source: NDArray[Any], depth: NDArray[Any]) -> None:
-        """Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m]."""
+    def add(
+        self,
+        reference: NDArray[Any],
+        source: NDArray[Any],
+        depth: NDArray[Any],
+        given: NDArray[Any] | None = None,
+    ) -> None:
+        """Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m]. given:
+        the source as another method registers it, of the reference's aspect.
+        """
     def result(self) -> Evaluation:
         """The Evaluation; ValueError without a frame."""
 
@@ -1161,12 +1268,12 @@ def display_gray(image: NDArray[Any]) -> NDArray[uint8]:
     """Gray for the eye, (H, W) uint8: 1 to 99 % of the non-zero pixels stretched to 0 to 255."""
 
 def overlay(
-    reference: NDArray[Any], registered: NDArray[Any], valid: NDArray[Any] | None = None
+    reference: NDArray[Any], registered: NDArray[Any], mask: NDArray[Any] | None = None
 ) -> NDArray[uint8]:
     """Red-cyan composite (H, W, 3) uint8 of two images of one size: reference red, other cyan.
 
-    Where the other is not valid (mask (H, W), nonzero where it is) the reference alone is
-    shown, in gray.
+    Where the other is not valid by its mask, (H, W) as Registrar.register() gives it, the
+    reference alone is shown, in gray.
     """
 
 class Stream:
@@ -1197,6 +1304,8 @@ class Stream:
         """Whether several threads may read at a time."""
     times: NDArray[float64] | None
     """(N,) seconds of the frames, never falling; None where unknown. Each stream has its clock."""
+    said: str
+    """For the user: what of it was not used, or is missing, in a line, or ''."""
 
 class Picked(Stream):
     """Some frames of a stream, in order."""
@@ -1226,9 +1335,15 @@ def header_size(file: str | PathLike[str]) -> tuple[int, int] | None:
     """(width, height) of a PNG or JPEG file by its header; None of others, and where it is not
     whole."""
 
+def times_beside(files: Sequence[str | PathLike[str]], stream: Stream) -> list[float] | None:
+    """Times of timestamps.csv or timestamps.txt beside the files of a stream, None where there
+    is none; a table without names that has more or fewer lines is not used, and stream.said
+    says so.
+    """
+
 def read_times(table: str | PathLike[str], stream: Stream) -> list[float]:
-    """Seconds of the frames of a stream from a file of `name timestamp` lines, see
-    times_of_table().
+    """Seconds of the frames of a stream from a file of `name timestamp` lines, or of as many
+    times as frames, in their order.
     """
 
 def scalar_sources(images: Stream, colormap: str = "auto") -> tuple[Stream, str]:
@@ -1381,6 +1496,11 @@ def load_frames(
     left, raises DecodeError of the first. progress(done) is called after each.
     """
 
+def plan_text(references: Stream, sources: Stream, depth: Any, chosen: Sequence[int]) -> str:
+    """What a run would read and pair, and the frames chosen to calibrate on where there are any,
+    a line each; of long footage the first and the last.
+    """
+
 def left_out(count: int, first: str) -> str:
     """The warning that frames were left out of a calibration, and why the first was."""
 
@@ -1426,6 +1546,14 @@ def add_lags(
     offset.
     """
 
+def distrust(line: str, result: CalibrationResult) -> None:
+    """The result is not to be trusted, for the reason in the line; an empty one changes nothing."""
+
+def joined_line(images: Iterable[NDArray[Any]], name: str) -> str:
+    """A line where most of the images look like two joined at their middle, one above the other
+    or side by side; else ''. name: REFERENCE or SOURCE.
+    """
+
 def frames_later(
     all_sources: Stream, partners: Sequence[int], lag: int
 ) -> tuple[list[int], list[int]]:
@@ -1445,8 +1573,22 @@ def read_text(file: str | PathLike[str]) -> str:
 def read_file(file: str | PathLike[str]) -> bytes:
     """The bytes of a file: InputError where it is none, as a pipe, or larger than 1 GiB."""
 
-def read_npy(file: str | PathLike[str]) -> NDArray[float32]:
-    """(h, w) float32 of a .npy file of one channel of floats; DecodeError where it is none."""
+def read_array(file: str | PathLike[str], is_image: bool) -> NDArray[Any] | None:
+    """What a .npy, .npz or .pfm file has, uint16 or float32; None where the suffix is another.
+
+    (h, w) or, of an image, which may be uint8, (h, w, 3). Raises DecodeError where it is
+    damaged, InputError where it is another array.
+    """
+
+def with_full_page_first(data: bytes, name: str) -> bytes:
+    """The bytes of a TIFF file with the page of full size first, as of one that begins with a
+    thumbnail; InputError, naming the file, where several pages are of that size.
+    """
+
+def video_line(name: str, times: Sequence[float], announced: float, rate: float) -> str:
+    """A line where fewer frames were decoded than the header announces, though they reach to the
+    end; else ''. InputError where the file ends early.
+    """
 
 def tiff_pixel_type(data: bytes) -> str:
     """The type of a TIFF's pixels, as numpy calls it; '' where the data does not say."""

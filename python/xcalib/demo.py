@@ -15,7 +15,8 @@ from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, report
 from .frames import check_folder_writable, size_of, write_bytes, write_image
 from .inputs import Inputs
 from .overlays import Picture, colour, with_edges
-from .pipeline import Frames, progress, run_calibration, save_rig
+from .pipeline import Frames, run_calibration, save_rig
+from .progress import progress
 from .registration import RegistrationOptions, run_registration
 from .report import Run, write_page
 

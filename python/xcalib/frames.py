@@ -32,6 +32,8 @@ from ._core import (
     display_gray,
     overlay,
     pair_files,
+    read_array,
+    with_full_page_first,
 )
 from .png import encode_png
 
@@ -40,6 +42,7 @@ Size = tuple[int, int]
 """Width and height [px]."""
 
 __all__ = [
+    "ARRAY_SUFFIXES",
     "IMAGE_SUFFIXES",
     "DecodeError",
     "Image",
@@ -50,12 +53,14 @@ __all__ = [
     "check_folder_writable",
     "check_output_writable",
     "decode",
+    "decode_bytes",
     "display_gray",
     "encode_image",
     "fit_rig",
     "gray",
     "is_truncated",
     "list_files",
+    "list_images",
     "overlay",
     "pair",
     "quiet_opencv",
@@ -66,7 +71,11 @@ __all__ = [
     "write_image",
 ]
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+IMAGE_SUFFIXES = (
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"),
+    *(".pgm", ".ppm", ".webp", ".jp2"),
+)
+ARRAY_SUFFIXES = (".npy",)
 
 
 # -- Names ---------------------------------------------------------------------------------------
@@ -75,6 +84,13 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 def list_files(folder: str | Path, suffixes: Collection[str] = IMAGE_SUFFIXES) -> list[Path]:
     """Files of ``folder`` with one of ``suffixes`` (any case), in natural order, at least one."""
     return _core.list_files(folder, list(suffixes))
+
+
+def list_images(folder: str | Path) -> list[Path]:
+    """The image files of a folder; arrays where it has no other, for they may lie beside images."""
+    files = list_files(folder, IMAGE_SUFFIXES + ARRAY_SUFFIXES)
+    images = [path for path in files if path.suffix.lower() not in ARRAY_SUFFIXES]
+    return images or files
 
 
 def pair(first: Sequence[Path], second: Sequence[Path]) -> list[tuple[Path, Path]]:
@@ -92,6 +108,9 @@ def read_image(path: str | Path) -> Image:
     The pixels come as they are stored: no rotation by EXIF tags, for a camera's geometry is that
     of its sensor.
     """
+    array = read_array(path, is_image=True)
+    if array is not None:
+        return array
     image = decode(Path(path))
     if image.dtype == np.float64:
         image = image.astype(np.float32)
@@ -135,10 +154,16 @@ def quiet_opencv() -> Iterator[None]:
 def decode(path: Path) -> Image:
     """Decode an image file with all its channels, or raise `DecodeError` naming the file."""
     if not path.is_file():
+        if path.is_symlink():
+            raise DecodeError(f"{path}: a link to a file that is not there")
         raise InputError(f"{path}: no such file")
-    data = path.read_bytes()
+    return decode_bytes(path.read_bytes(), str(path))
+
+
+def decode_bytes(data: bytes, path: str) -> Image:
+    """The same of the bytes of a file; ``path`` names it in messages."""
     if data.startswith((b"II*\0", b"MM\0*")):
-        data = as_stored(data)
+        data = with_full_page_first(as_stored(data), path)
     image = None
     with quiet_opencv(), contextlib.suppress(cv2.error):
         if data and not is_truncated(data):

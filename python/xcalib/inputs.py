@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .depth import PNG_SCALE, MeasuredDepth, NetworkOptions, PlaneDepth
+from .depth import DepthUnits, MeasuredDepth, NetworkOptions, PlaneDepth
 from .footage import Matching
 
 
@@ -18,8 +18,8 @@ class Inputs:
     """Folders or patterns of images, videos, bags; see `footage.open_stream`."""
     depth: str | Path
     """A ``--depth`` argument, see `depth.open_depth`."""
-    depth_scale: float = PNG_SCALE
-    """Metres per count of 16-bit PNG depth."""
+    units: DepthUnits = field(default_factory=DepthUnits)
+    """What the numbers of depth maps mean."""
     matching: Matching = field(default_factory=Matching)
     """Which frames of the two belong together."""
     plane: PlaneDepth = field(default_factory=PlaneDepth)

@@ -1,8 +1,8 @@
 """How well two images are registered, and how far a rig is from the true one.
 
-Images are (H, W) or (H, W, 3), uint8, uint16 (both scaled to [0, 1]) or float32; a mask is (H, W),
-nonzero where valid. A pixel counts where its whole stencil is valid. A mask of `Registrar.register`
-has 0 for valid pixels: pass ``mask == 0``.
+Images are (H, W) or (H, W, 3), uint8, uint16 (both scaled to [0, 1]) or float32, colour as
+blue-green-red. A mask is that of `Registrar.register`: (H, W), 0 where valid, 1 to 3 where not and
+why. A pixel counts where its whole stencil is valid.
 """
 
 from dataclasses import dataclass
@@ -64,7 +64,7 @@ def patch_residual(
     Parameters
     ----------
     reference, registered : (H, W) or (H, W, 3) uint8, uint16 or float32 in [0, 1]
-    mask : (H, W), nonzero where valid
+    mask : (H, W), 0 where valid, as `Registrar.register` gives it
 
     Raises
     ------

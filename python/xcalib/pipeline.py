@@ -1,13 +1,11 @@
-"""From frames on disk to a rig, with progress bars on stderr; `registration` is what follows."""
+"""From frames on disk to a rig, with progress on stderr; `registration` is what follows."""
 
 from __future__ import annotations
 
-import contextlib
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,33 +19,26 @@ from ._core import (
     TimeOffset,
     add_lags,
     calibrate,
+    distrust,
     draw_frames,
     frames_later,
     frames_to_judge_plane,
+    joined_line,
     load_frames,
     look_at_lags,
     orientation_line,
     with_file_name,
 )
 from .choose import choose_informed
-from .depth import DepthProvider, FolderDepth, PlaneDepth
+from .depth import ConstantDepth, DepthProvider, FolderDepth, PlaneDepth
 from .flow import FlowProvider
 from .footage import Picked, Stream, TopicDepth, open_matched_depth, open_pairs
 from .footage.bag import clock_line
 from .footage.opening import PickedDepth
 from .frames import DecodeError, Image, InputError, fit_rig, size_of
 from .inputs import Inputs
+from .progress import progress, stages_bar
 from .thermal import scalar_sources
-
-T = TypeVar("T")
-
-
-def progress(items: Iterable[T], total: int, what: str, quiet: bool = False) -> Iterator[T]:
-    """The items, with a bar on stderr if that is a terminal."""
-    bar: Iterable[T] = tqdm(
-        items, total=total, desc=what, unit="frame", disable=True if quiet else None, leave=False
-    )
-    return iter(bar)
 
 
 @dataclass(frozen=True)
@@ -65,6 +56,8 @@ class Frames:
     """Of the references, in all sources."""
     offset: TimeOffset | None = None
     """That they were paired with."""
+    depth_line: str = ""
+    """What the numbers of the depth maps were taken for, in a line, or ''."""
 
     @staticmethod
     def open(inputs: Inputs, rig: Rig | None = None) -> Frames:
@@ -78,7 +71,7 @@ class Frames:
                 pairs.all_references,
                 used,
                 str(inputs.depth),
-                inputs.depth_scale,
+                inputs.units,
                 inputs.plane,
                 inputs.network,
                 inputs.measured,
@@ -105,6 +98,7 @@ class Frames:
             pairs.all_sources,
             partners,
             pairs.offset,
+            depth.line(),
         )
 
     def __len__(self) -> int:
@@ -162,7 +156,7 @@ def misfit(depth: DepthProvider, rig: Rig) -> str:
 
 def choose_by_content(frames: Frames, max_frames: int, seed: int, quiet: bool = False) -> Choice:
     """The frames that determine the rig best, see `choose`. Depth counts where it is cheap."""
-    cheap = isinstance(frames.given_depth, FolderDepth | PlaneDepth | TopicDepth)
+    cheap = isinstance(frames.given_depth, ConstantDepth | FolderDepth | PlaneDepth | TopicDepth)
 
     def read(index: int) -> tuple[Image, Image, NDArray[np.float32] | None]:
         if cheap:
@@ -218,6 +212,8 @@ def run_calibration(
             result = calibrate(references, sources, depths, initial, calibration, show, flow)
         except ValueError as error:
             raise InputError(with_file_name(str(error), frames.references, chosen)) from None
+        for images, name in ((references, "REFERENCE"), (sources, "SOURCE")):
+            distrust(joined_line(images, name), result)
         if frames.all_sources is not None and frames.offset is not None:
             lag = look_at_lags(
                 *(references, sources, depths, [frames.partners[index] for index in chosen]),
@@ -225,23 +221,6 @@ def run_calibration(
             )
             add_lags(result, lag, frames.offset, frames.all_sources)
     return result, chosen
-
-
-@contextlib.contextmanager
-def stages_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    """A function that shows a stage and the share of it that is done, on stderr."""
-    with tqdm(
-        total=1.0,
-        bar_format="{desc} {percentage:3.0f}%|{bar}| {elapsed}",
-        disable=True if quiet else None,
-        leave=False,
-    ) as bar:
-
-        def show(stage: str, fraction: float) -> None:
-            bar.set_description_str(stage, refresh=False)
-            bar.update(fraction - bar.n)
-
-        yield show
 
 
 def _readable(stream: Stream, chosen: Sequence[int]) -> Iterator[Image]:

@@ -5,9 +5,7 @@ What is written is noted in a journal; frames that it lists are not made again.
 
 from __future__ import annotations
 
-import sys
 import threading
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,15 +22,15 @@ from ._core import (
     read_file,
     register_frames,
 )
+from .depth.constant import distance_of
 from .footage import encoder
 from .pipeline import Frames
+from .progress import Lines
 
 __all__ = ["Registration", "RegistrationOptions", "run_registration"]
 
 PART_FRAMES = 250
 """Frames of a video that a run that is killed, not only interrupted, can lose at most."""
-EVERY = 10.0
-"""Time between lines of progress where there is no terminal for a bar [s]."""
 
 
 @dataclass(frozen=True)
@@ -96,11 +94,16 @@ def run_registration(
         )
 
 
+def is_word(depth_spec: str) -> bool:
+    """Whether a ``--depth`` argument names no path."""
+    return depth_spec == "plane" or distance_of(depth_spec) is not None
+
+
 def described(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Values as text, paths from the root, and tables by what is in them too."""
     text = []
     for name, value in inputs.items():
-        path = isinstance(value, Path) or (name == "depth_spec" and value != "plane")
+        path = isinstance(value, Path) or (name == "depth_spec" and not is_word(value))
         line = str(absolute_path(value) if path else value)
         if path and Path(value).is_file() and name not in ("reference", "source", "depth_spec"):
             line += f" ({fingerprint(read_file(value))})"
@@ -109,11 +112,10 @@ def described(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 class Progress:
-    """A bar on stderr; where that is no terminal, a line every `EVERY` seconds."""
+    """A bar on stderr; where that is no terminal, a line now and then."""
 
     def __init__(self, total: int, quiet: bool) -> None:
-        self._lines = not quiet and not sys.stderr.isatty()
-        self._said = time.perf_counter()
+        self._lines = Lines(quiet)
         self._bar = tqdm(
             total=total,
             desc="registering",
@@ -136,6 +138,5 @@ class Progress:
             self._bar.set_postfix_str(busy, refresh=False)
             self._bar.initial = now.earlier
             self._bar.update(now.earlier + now.made - self._bar.n)
-        if self._lines and now.made and time.perf_counter() - self._said > EVERY:
-            self._said = time.perf_counter()
-            print(f"registering: {now.line()}", file=sys.stderr, flush=True)
+        if now.made:
+            self._lines.say("registering", now.line())

@@ -39,6 +39,8 @@ struct AdamOptions {
     double decay = 0.98;               // of either by a step, (0, 1]
     double fine_from = 0.75;           // of all steps, where stage 2 begins, [0, 1]
     int translation_scales = 2;        // of Eq. (translation), 1 to 3
+
+    void validate() const;  // throws std::invalid_argument: field, value, range
 };
 
 struct SearchOptions {
@@ -48,6 +50,8 @@ struct SearchOptions {
     double min_overlap = 0.3;    // (0, 1): geometric mean of the shares of both images' edges
     int map_width = 96;          // [px], >= 32
     int candidates = 12;         // peaks considered, >= 1
+
+    void validate() const;  // throws std::invalid_argument: field, value, range
 };
 
 // The expected error up to which a calibration is trusted, over the footage's own depths [px of the

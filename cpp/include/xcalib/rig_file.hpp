@@ -22,4 +22,8 @@ std::vector<std::string> implausible(const Rig& rig);
 // digits that read back as the same double. Throws std::system_error where it cannot be written.
 void save_rig(const Rig& rig, const std::string& path);
 
+// The same without a file.
+std::string rig_text(const Rig& rig);
+Rig rig_of_text(const std::string& text);
+
 }  // namespace xcalib

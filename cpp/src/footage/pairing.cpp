@@ -19,6 +19,8 @@ namespace {
 
 using std::filesystem::path;
 
+constexpr std::size_t kMaxName = 255;  // of which an expression takes little of the stack
+
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 // A number of any length, so that texts of one length compare as numbers.
@@ -59,6 +61,17 @@ std::string numbers(const path& file) {
     std::string found;
     for (std::size_t i = 1; i < parts.size(); i += 2) found += parts[i] + " ";
     return found;
+}
+
+// The last number of a name that has a stamp before it; empty where there is none.
+std::string index_behind_stamp(const path& file) {
+    const std::vector<std::string> parts = parts_of(file.stem().string());
+    constexpr std::size_t kStamp = 8;  // digits of a date at least
+    if (parts.size() < 4) return "";
+    const std::size_t last = parts.size() - (parts.size() % 2 ? 2 : 1);
+    bool stamp = false;
+    for (std::size_t i = 1; i < last; i += 2) stamp = stamp || parts[i].size() >= kStamp;
+    return stamp && parts[last].size() <= 6 ? parts[last] : "";
 }
 
 using ByKey = std::map<std::string, int>;
@@ -103,6 +116,61 @@ std::optional<double> number_of(const std::string& text) {
     if (std::from_chars(begin, end, value).ptr != end || begin == end || !std::isfinite(value))
         return std::nullopt;
     return value;
+}
+
+// Days since 1970 of a date of the Gregorian calendar.
+long days_of(int year, int month, int day) {
+    const int y = year - (month <= 2), era = y / 400, of_era = y - era * 400;
+    const int of_year = (153 * (month + (month > 2 ? -3 : 9)) + 2) / 5 + day - 1;
+    return era * 146097L + of_era * 365L + of_era / 4 - of_era / 100 + of_year - 719468;
+}
+
+// A date and a time of day with a fraction of a second, as 20240131_235959.123 or
+// 2024-01-31T23-59-59-123456 have it. Without a fraction frames share their second.
+std::optional<double> time_of_date(const std::string& name) {
+    static const std::regex kDate(
+        R"((?:^|[^0-9])(19\d\d|20\d\d)[-_.]?(\d\d)[-_.]?(\d\d)[-_T ]?(\d\d)[-_.:h]?(\d\d)[-_.:m]?(\d\d)[-_.,](\d{3,9})(?:$|[^0-9]))");
+    std::smatch found;
+    if (name.size() > kMaxName || !std::regex_search(name, found, kDate)) return std::nullopt;
+    const auto part = [&](std::size_t i) { return std::stoi(found[i].str()); };
+    const int month = part(2), day = part(3), hour = part(4), minute = part(5), second = part(6);
+    if (month < 1 || month > 12 || day < 1 || day > 31 || hour > 23 || minute > 59 || second > 60)
+        return std::nullopt;
+    const double fraction = *number_of("0." + found[7].str());
+    return 86400.0 * static_cast<double>(days_of(part(1), month, day)) + 3600 * hour + 60 * minute +
+           second + fraction;
+}
+
+// Seconds and the digits behind them, as SEC_NSEC names have them.
+struct SplitTime {
+    std::string seconds, rest;
+};
+
+std::optional<SplitTime> split_time_of(const std::string& name) {
+    static const std::regex kSplit(R"((?:^|[^0-9])(\d{9,10})[-_](\d{1,9})(?:$|[^0-9]))");
+    std::smatch found;
+    if (name.size() > kMaxName || !std::regex_search(name, found, kSplit)) return std::nullopt;
+    return SplitTime{found[1].str(), found[2].str()};
+}
+
+// Of all names or none. The digits behind the seconds count nanoseconds, or, where all have as
+// many and fewer than nine, micro- or milliseconds.
+std::optional<std::vector<double>> split_times_of(const std::vector<std::string>& names) {
+    std::vector<SplitTime> parts;
+    for (const std::string& name : names) {
+        const std::optional<SplitTime> part = split_time_of(name);
+        if (!part) return std::nullopt;
+        parts.push_back(*part);
+    }
+    const auto as_many = [&](std::size_t digits) {
+        return std::all_of(parts.begin(), parts.end(),
+                           [&](const SplitTime& part) { return part.rest.size() == digits; });
+    };
+    const double unit = as_many(6) ? 1e-6 : as_many(3) ? 1e-3 : 1e-9;
+    std::vector<double> times;
+    for (const SplitTime& part : parts)
+        times.push_back(*number_of(part.seconds) + *number_of(part.rest) * unit);
+    return times;
 }
 
 // The time that a name holds, if it holds one and only one.
@@ -155,41 +223,136 @@ std::vector<int> natural_order(const std::vector<std::string>& names) {
     return order;
 }
 
-std::vector<int> pair_files(const std::vector<path>& first, const std::vector<path>& second) {
-    const auto count = [](const std::vector<path>& files) { return std::to_string(files.size()); };
-    for (const auto key : {&stem, &numbers}) {
-        const ByKey ours = by_key(first, key), theirs = by_key(second, key);
-        std::vector<int> partners;
-        std::vector<path> lost;
-        for (const path& file : first) {
-            const auto found = theirs.find(key(file));
-            if (found != theirs.end()) partners.push_back(found->second);
-            else lost.push_back(file);
+namespace {
+
+// The partners of two lists of files by a key, and what has none.
+struct Matches {
+    std::vector<int> first, second;
+    std::vector<path> lost;
+};
+
+Matches matches_of(const std::vector<path>& first, const std::vector<path>& second,
+                   std::string (*key)(const path&)) {
+    const ByKey ours = by_key(first, key), theirs = by_key(second, key);
+    Matches found;
+    if (ours.empty() || theirs.empty()) return found;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+        const auto partner = theirs.find(key(first[i]));
+        if (partner == theirs.end()) {
+            found.lost.push_back(first[i]);
+        } else {
+            found.first.push_back(static_cast<int>(i));
+            found.second.push_back(partner->second);
         }
-        if (ours.empty() || partners.empty()) continue;
-        for (const path& file : second)
-            if (!ours.count(key(file))) lost.push_back(file);
-        if (lost.empty()) return partners;
-        throw InputError(folder_of(first[0]) + " (" + count(first) + " files) and " +
-                         folder_of(second[0]) + " (" + count(second) +
-                         " files) do not pair: without a partner " + few(lost) +
-                         "; expected the same names or numbers in both");
+    }
+    for (const path& file : second)
+        if (!ours.count(key(file))) found.lost.push_back(file);
+    return found;
+}
+
+// By the first key that pairs all; else by the first that pairs any.
+Matches matches_of(const std::vector<path>& first, const std::vector<path>& second) {
+    Matches best;
+    for (const auto key : {&stem, &numbers, &index_behind_stamp}) {
+        Matches found = matches_of(first, second, key);
+        if (found.first.empty()) continue;
+        if (found.lost.empty()) return found;
+        if (best.first.empty()) best = std::move(found);
+    }
+    return best;
+}
+
+const char* const kOtherWays =
+    "; expected the same names or numbers in both, or --pair order, or --pair time with"
+    " --reference-times and --source-times";
+
+std::string counts_of(const std::vector<path>& first, const std::vector<path>& second) {
+    return folder_of(first[0]) + " (" + std::to_string(first.size()) + " files) and " +
+           folder_of(second[0]) + " (" + std::to_string(second.size()) + " files)";
+}
+
+}  // namespace
+
+std::vector<int> pair_files(const std::vector<path>& first, const std::vector<path>& second) {
+    const Matches found = matches_of(first, second);
+    if (!found.first.empty()) {
+        if (found.lost.empty()) return found.second;
+        throw InputError(counts_of(first, second) + " do not pair: without a partner " +
+                         few(found.lost) + "; expected the same names or numbers in both");
     }
     if (first.size() != second.size())
-        throw InputError(folder_of(first[0]) + " has " + count(first) + " files, " +
-                         folder_of(second[0]) + " has " + count(second) +
+        throw InputError(folder_of(first[0]) + " has " + std::to_string(first.size()) + " files, " +
+                         folder_of(second[0]) + " has " + std::to_string(second.size()) +
                          "; expected as many in both, with the same names");
     return up_to(first.size());
 }
 
-std::optional<std::vector<double>> times_of_names(const std::vector<std::string>& names) {
-    std::vector<double> times;
-    for (const std::string& name : names) {
-        const std::optional<double> time = time_of(name);
-        if (!time || (!times.empty() && *time <= times.back())) return std::nullopt;
-        times.push_back(*time);
+Pairing pair_names(const std::vector<path>& first, const std::vector<path>& second) {
+    Pairing pairing;
+    pairing.method = "name";
+    Matches found = matches_of(first, second);
+    if (found.first.empty()) {
+        if (first.size() != second.size())
+            throw InputError(counts_of(first, second) +
+                             " do not pair: no name or number is common to them" + kOtherWays);
+        pairing.method = "order";
+        pairing.references = pairing.sources = up_to(first.size());
+        return pairing;
     }
-    if (times.empty()) return std::nullopt;
+    // A few that are alone are frames that one camera lost; many, that the names mean something
+    // else.
+    constexpr double kLeastPaired = 0.9;
+    const double most = static_cast<double>(std::max(first.size(), second.size()));
+    if (static_cast<double>(found.first.size()) < kLeastPaired * most)
+        throw InputError(counts_of(first, second) + " do not pair: without a partner " +
+                         few(found.lost) + kOtherWays);
+    pairing.references = std::move(found.first);
+    pairing.sources = std::move(found.second);
+    pairing.dropped_references = static_cast<int>(first.size() - pairing.references.size());
+    pairing.dropped_sources = static_cast<int>(second.size() - pairing.sources.size());
+    if (!found.lost.empty()) pairing.alone = few(found.lost);
+    return pairing;
+}
+
+std::optional<std::vector<double>> times_of_names(const std::vector<std::string>& names) {
+    const auto each = [&](const auto& time_in) -> std::optional<std::vector<double>> {
+        std::vector<double> times;
+        for (const std::string& name : names) {
+            const std::optional<double> time = time_in(name);
+            if (!time) return std::nullopt;
+            times.push_back(*time);
+        }
+        return times;
+    };
+    std::optional<std::vector<double>> times = each(time_of);
+    if (!times) times = split_times_of(names);
+    if (!times) times = each(time_of_date);
+    const auto falls = [](double earlier, double later) { return later <= earlier; };
+    if (!times || times->empty() ||
+        std::adjacent_find(times->begin(), times->end(), falls) != times->end())
+        return std::nullopt;
+    return times;
+}
+
+std::vector<double> times_in_order(const std::string& text) {
+    static const std::regex kDay(R"((\d{4})-(\d\d)-(\d\d)[ T](\d\d):(\d\d):(\d\d)(\.\d{1,9})?Z?)");
+    std::vector<double> times;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        line = stripped(line);
+        if (line.empty() || line[0] == '#') continue;
+        std::smatch day;
+        if (line.size() <= kMaxName && std::regex_match(line, day, kDay)) {
+            const auto part = [&](std::size_t i) { return std::stoi(day[i].str()); };
+            times.push_back(86400.0 * static_cast<double>(days_of(part(1), part(2), part(3))) +
+                            3600.0 * part(4) + 60 * part(5) + part(6) +
+                            (day[7].matched ? *number_of("0" + day[7].str()) : 0));
+        } else if (const std::optional<double> time = seconds_of(line)) {
+            times.push_back(*time);
+        } else if (!times.empty()) {
+            return {};
+        }
+    }
     return times;
 }
 
@@ -258,6 +421,7 @@ std::string Pairing::line() const {
             " (median gap %.1f ms, source late by %+.4f s); without a partner: %d reference,"
             " %d source frames",
             1e3 * gap, offset, dropped_references, dropped_sources);
+    if (!alone.empty()) text += "; without a partner, and left out: " + alone;
     if (lag != 0) text += format("; source late by %+d of its frames", lag);
     return text;
 }
@@ -297,7 +461,7 @@ Pairing pair_times(const std::vector<double>& references, const std::vector<doub
     if (gaps.empty())
         throw InputError(format(
             "no two frames are within %g s: reference times are %.3f to %.3f s, source times"
-            " %.3f to %.3f s; expected one clock, or --pair order",
+            " %.3f to %.3f s; expected one clock, --time-offset, or --pair order",
             *max_gap, references.front(), references.back(), shifted.front(), shifted.back()));
     found.dropped_references = static_cast<int>(references.size() - gaps.size());
     found.dropped_sources = static_cast<int>(shifted.size() - gaps.size());
@@ -321,14 +485,17 @@ Pairing pair_frames(const FrameList& references, const FrameList& sources, const
     }
     if (offset != 0 && method != "time")
         throw InputError(
-            format("a clock offset of %g s needs frames paired by time; they are by %s", offset,
-                   method.c_str()));
+            format("a clock offset of %g s needs frames paired by time; they are by %s; expected"
+                   " times, as by --reference-times and --source-times, or --time-offset in frames"
+                   " (2f)",
+                   offset, method.c_str()));
     if (method == "time") {
         for (const auto& [what, list] : {std::pair{"reference", &references}, {"source", &sources}})
             if (!list->times)
                 throw InputError(list->where.at(0) + ": the " + what +
                                  " frames have no times that rise; expected them in the file"
-                                 " names, in timestamps.csv, or in a video or bag");
+                                 " names, in timestamps.csv, in a video or bag, or by --" +
+                                 what + "-times FILE");
         return pair_times(*references.times, *sources.times, offset, max_gap);
     }
     Pairing found;
@@ -336,15 +503,22 @@ Pairing pair_frames(const FrameList& references, const FrameList& sources, const
     found.references = up_to(references.names.size());
     if (method == "name") {
         if (!files)
-            throw InputError("pairing by name needs two folders of images; expected order or time");
-        found.sources = pair_files(references.paths, sources.paths);
+            throw InputError(
+                "pairing by name needs two folders of images; expected --pair order or --pair "
+                "time");
+        found = pair_names(references.paths, sources.paths);
+        if (given == "name" && found.method != "name")
+            throw InputError(counts_of(references.paths, sources.paths) +
+                             " do not pair by name: no name or number is common to them;"
+                             " expected --pair order");
         return found;
     }
     if (references.names.size() != sources.names.size())
         throw InputError(references.where.at(0) + " is the first of " +
                          std::to_string(references.names.size()) + " frames, " +
                          sources.where.at(0) + " of " + std::to_string(sources.names.size()) +
-                         "; expected as many, or times to pair them by");
+                         "; expected as many, or times to pair them by: --reference-times and"
+                         " --source-times");
     found.sources = found.references;
     return found;
 }

@@ -176,12 +176,18 @@ Json json_of(const Evaluation& evaluation) {
     for (const auto& [registered, unregistered] : evaluation.frames)
         frames.push_back(
             {{"registered", json_of(registered)}, {"unregistered", json_of(unregistered)}});
-    return {{"size", Json::array({evaluation.width, evaluation.height})},
-            {"valid_share", evaluation.valid_share},
-            {"registered", json_of(evaluation.registered)},
-            {"unregistered", json_of(evaluation.unregistered)},
-            {"gain_percent", json_of(gains)},
-            {"frames", frames}};
+    Json out{{"size", Json::array({evaluation.width, evaluation.height})},
+             {"valid_share", evaluation.valid_share},
+             {"registered", json_of(evaluation.registered)},
+             {"unregistered", json_of(evaluation.unregistered)},
+             {"gain_percent", json_of(gains)}};
+    if (evaluation.given) {
+        out["given"] = json_of(*evaluation.given);
+        for (std::size_t i = 0; i < frames.size(); ++i)
+            frames[i]["given"] = json_of(evaluation.given_frames[i]);
+    }
+    out["frames"] = frames;
+    return out;
 }
 
 Json json_of(const Rig& rig) {

@@ -67,6 +67,34 @@ Scores scores_of(const Image& reference, const Image& image, const std::uint8_t*
     return scores;
 }
 
+// Means over the frames where a score is defined; patches of all frames count alike.
+Scores pooled(const std::vector<Scores>& frames, const std::vector<double>& lengths) {
+    Scores out;
+    for (std::size_t i = 0; i < kScoreNames.size(); ++i) {
+        double sum = 0;
+        int count = 0;
+        for (const Scores& frame : frames)
+            if (std::isfinite(frame[i])) {
+                sum += frame[i];
+                ++count;
+            }
+        out[i] = count ? sum / count : kNone;
+    }
+    out[kPatchMedian] = out[kPatchUnder2px] = kNone;
+    set_patch_scores(lengths, out);
+    return out;
+}
+
+// To within a pixel.
+void require_aspect(const ImageView& given, const ImageView& reference) {
+    const long difference = static_cast<long>(given.width) * reference.height -
+                            static_cast<long>(given.height) * reference.width;
+    if (std::abs(difference) > std::max(reference.width, reference.height))
+        throw std::invalid_argument(
+            format("the registered image is %dx%d, expected the aspect of the reference's %dx%d",
+                   given.width, given.height, reference.width, reference.height));
+}
+
 }  // namespace
 
 double Evaluation::gain(std::size_t score) const {
@@ -88,15 +116,24 @@ std::string Evaluation::table() const {
                              {"PSNR [dB]", 1, 2},
                              {"patch median [px]", 1, 2},
                              {"patch < 2 px [%]", 100, 1}};
-    std::string text = format("%-18s%14s%14s%10s\n", "", "unregistered", "registered", "change");
+    const auto number = [](double value, int digits, bool sign = false) {
+        return std::isnan(value) ? sign ? "-" : "nan"
+                                 : format(sign ? "%+.*f" : "%.*f", digits, value);
+    };
+    std::string text = format("%-18s%14s%14s%12s%s\n", "", "unregistered", "registered",
+                              "difference", given ? "       given  difference" : "");
     for (std::size_t i = 0; i < kScoreNames.size(); ++i) {
-        const auto number = [&](const Scores& scores) {
-            const double value = kRows[i].scale * scores[i];
-            return std::isnan(value) ? "nan" : format("%.*f", kRows[i].digits, value);
-        };
-        const std::string change = std::isnan(gain(i)) ? "-" : format("%+.1f %%", gain(i));
-        text += format("%-18s%14s%14s%10s\n", kRows[i].label, number(unregistered).c_str(),
-                       number(registered).c_str(), change.c_str());
+        const int digits = kRows[i].digits;
+        const double before = kRows[i].scale * unregistered[i];
+        const double after = kRows[i].scale * registered[i];
+        text += format("%-18s%14s%14s%12s", kRows[i].label, number(before, digits).c_str(),
+                       number(after, digits).c_str(), number(after - before, digits, true).c_str());
+        if (given) {
+            const double theirs = kRows[i].scale * (*given)[i];
+            text += format("%12s%12s", number(theirs, digits).c_str(),
+                           number(theirs - before, digits, true).c_str());
+        }
+        text += "\n";
     }
     return text + format("%zu frames at %dx%d, %.1f %% of the pixels judged", frames.size(), width,
                          height, 100 * valid_share);
@@ -108,7 +145,8 @@ struct Evaluator::State {
     std::optional<Registrar> registrar{};
     Size size{}, source_size{};
     std::vector<std::pair<Scores, Scores>> frames{};
-    std::vector<double> shares{}, lengths_after{}, lengths_before{};
+    std::vector<Scores> given{};
+    std::vector<double> shares{}, lengths_after{}, lengths_before{}, lengths_given{};
 
     void open(const ImageView& reference, const ImageView& source) {
         const Rig full =
@@ -134,9 +172,11 @@ Evaluator::Evaluator(const Rig& rig, int width, int num_threads)
 
 Evaluator::~Evaluator() = default;
 
-void Evaluator::add(const ImageView& reference, const ImageView& source, const ImageView& depth) {
+void Evaluator::add(const ImageView& reference, const ImageView& source, const ImageView& depth,
+                    const ImageView* given) {
     State& s = *state_;
     if (!s.registrar) s.open(reference, source);
+    if (given) require_aspect(*given, reference);
     const Image target = resized(known_gray(reference), s.size), plain = known_gray(source);
     Image registered(s.size.width, s.size.height);
     std::vector<std::uint8_t> codes(registered.pixels.size());
@@ -160,6 +200,11 @@ void Evaluator::add(const ImageView& reference, const ImageView& source, const I
             scores_of(target, resized(plain, s.size), mask.data, s.num_threads, s.lengths_before);
     }
     s.frames.push_back(scores);
+    if (!given) return;
+    s.given.emplace_back().fill(kNone);
+    if (judged > 0)
+        s.given.back() = scores_of(target, resized(known_gray(*given), s.size), mask.data,
+                                   s.num_threads, s.lengths_given);
 }
 
 Evaluation Evaluator::result() const {
@@ -171,25 +216,16 @@ Evaluation Evaluator::result() const {
     out.frames = s.frames;
     for (const double share : s.shares)
         out.valid_share += share / static_cast<double>(s.shares.size());
-    // Means over the frames where a score is defined; patches of all frames count alike.
-    for (std::size_t i = 0; i < kScoreNames.size(); ++i) {
-        const auto mean = [&](auto member) {
-            double sum = 0;
-            int count = 0;
-            for (const auto& frame : s.frames)
-                if (std::isfinite((frame.*member)[i])) {
-                    sum += (frame.*member)[i];
-                    ++count;
-                }
-            return count ? sum / count : kNone;
-        };
-        out.registered[i] = mean(&std::pair<Scores, Scores>::first);
-        out.unregistered[i] = mean(&std::pair<Scores, Scores>::second);
+    std::vector<Scores> after, before;
+    for (const auto& [registered, unregistered] : s.frames) {
+        after.push_back(registered);
+        before.push_back(unregistered);
     }
-    for (auto* scores : {&out.registered, &out.unregistered})
-        (*scores)[kPatchMedian] = (*scores)[kPatchUnder2px] = kNone;
-    set_patch_scores(s.lengths_after, out.registered);
-    set_patch_scores(s.lengths_before, out.unregistered);
+    out.registered = pooled(after, s.lengths_after);
+    out.unregistered = pooled(before, s.lengths_before);
+    if (s.given.empty()) return out;
+    out.given = pooled(s.given, s.lengths_given);
+    out.given_frames = s.given;
     return out;
 }
 

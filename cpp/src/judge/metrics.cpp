@@ -32,7 +32,7 @@ struct Correlation {
     double value() const {
         if (n < 1) return kNaN;
         const double norm = (aa - a * a / n) * (bb - b * b / n);
-        return norm > 0 ? (ab - a * b / n) / std::sqrt(norm) : kNaN;
+        return norm > 0 ? std::clamp((ab - a * b / n) / std::sqrt(norm), -1.0, 1.0) : kNaN;
     }
 };
 
@@ -98,7 +98,7 @@ double ssim(const Image& reference, const Image& registered, const std::uint8_t*
                 (2 * ua * ub + c1) * (2 * vab + c2) / ((ua * ua + ub * ub + c1) * (va + vb + c2));
             ++count;
         }
-    return count > 0 ? sum / static_cast<double>(count) : kNaN;
+    return count > 0 ? std::min(1.0, sum / static_cast<double>(count)) : kNaN;
 }
 
 double ncc(const Image& reference, const Image& registered, const std::uint8_t* valid) {

@@ -68,7 +68,8 @@ double nec(const Image& reference, const Image& registered, const std::uint8_t* 
         aa += ga * ga;
         bb += gb * gb;
     }
-    return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : std::numeric_limits<double>::quiet_NaN();
+    if (!(aa > 0 && bb > 0)) return std::numeric_limits<double>::quiet_NaN();
+    return std::min(1.0, ab / std::sqrt(aa * bb));  // rounding aside, it is never above
 }
 
 EdgeField edge_field(const Image& image, float mean_magnitude, float relative_floor) {

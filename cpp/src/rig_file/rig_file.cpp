@@ -122,7 +122,13 @@ Rig load_rig(const std::string& path) {
     }
 }
 
-void save_rig(const Rig& rig, const std::string& path) {
+Rig rig_of_text(const std::string& text) {
+    return parse_rig("the text of a rig", YAML::Load(text));
+}
+
+void save_rig(const Rig& rig, const std::string& path) { write_whole(path, rig_text(rig)); }
+
+std::string rig_text(const Rig& rig) {
     rig.validate();
     const Eigen::Quaterniond& q = rig.source_from_reference.rotation;
     std::ostringstream out;
@@ -142,7 +148,7 @@ void save_rig(const Rig& rig, const std::string& path) {
             << "  scale: " << text_of(rig.relative_depth->scale) << "\n"
             << "  shift: " << text_of(rig.relative_depth->shift) << "\n";
     if (rig.verdict) write_verdict(out, *rig.verdict);
-    write_whole(path, out.str());
+    return out.str();
 }
 
 std::vector<std::string> implausible(const Rig& rig) {

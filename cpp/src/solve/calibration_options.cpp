@@ -38,6 +38,30 @@ Tolerance Tolerance::parse(const std::string& option, const std::string& text) {
     return {values[0], values.size() > 1 ? values[1] : kWider * values[0]};
 }
 
+void SearchOptions::validate() const {
+    require(max_fov_ratio > 1 && max_fov_ratio <= 10, "search.max_fov_ratio", max_fov_ratio,
+            "a ratio in (1, 10]");
+    require(max_roll_deg >= 0 && max_roll_deg <= 180, "search.max_roll_deg", max_roll_deg,
+            "an angle in [0, 180] deg");
+    require(min_overlap > 0 && min_overlap < 1, "search.min_overlap", min_overlap,
+            "a share in (0, 1)");
+    require(map_width >= 32, "search.map_width", map_width, "at least 32 px");
+    require(candidates >= 1, "search.candidates", candidates, "at least 1");
+}
+
+void AdamOptions::validate() const {
+    require(epochs >= 1, "adam.epochs", epochs, "at least 1");
+    require(batch >= 1, "adam.batch", batch, "at least 1");
+    require(learning_rate > 0 && std::isfinite(learning_rate), "adam.learning_rate", learning_rate,
+            "a finite number > 0");
+    require(fine_learning_rate > 0 && std::isfinite(fine_learning_rate), "adam.fine_learning_rate",
+            fine_learning_rate, "a finite number > 0");
+    require(decay > 0 && decay <= 1, "adam.decay", decay, "a factor in (0, 1]");
+    require(fine_from >= 0 && fine_from <= 1, "adam.fine_from", fine_from, "a share in [0, 1]");
+    require(translation_scales >= 1 && translation_scales <= 3, "adam.translation_scales",
+            translation_scales, "1 to 3");
+}
+
 void CalibrationOptions::validate() const {
     require(max_frames >= 1, "max_frames", max_frames, "at least 1");
     require(num_threads >= 0 && num_threads <= kMaxThreads, "num_threads", num_threads,
@@ -63,14 +87,7 @@ void CalibrationOptions::validate() const {
         throw std::invalid_argument(
             "options: optimize_lens with source_lens = " + Lens::word(source_lens) +
             ", expected brown of 4 or 5 coefficients, or none given");
-    require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
-            search.max_fov_ratio, "a ratio in (1, 10]");
-    require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",
-            search.max_roll_deg, "an angle in [0, 180] deg");
-    require(search.min_overlap > 0 && search.min_overlap < 1, "search.min_overlap",
-            search.min_overlap, "a share in (0, 1)");
-    require(search.map_width >= 32, "search.map_width", search.map_width, "at least 32 px");
-    require(search.candidates >= 1, "search.candidates", search.candidates, "at least 1");
+    search.validate();
     require(tolerance.median > 0, "tolerance.median", tolerance.median, "more than 0 px");
     require(tolerance.p95 > 0, "tolerance.p95", tolerance.p95, "more than 0 px");
     if (relative_depth) relative_depth->validate("options: relative_depth");
@@ -78,17 +95,7 @@ void CalibrationOptions::validate() const {
     if (search.mode == SearchMode::full || search.mode == SearchMode::local)
         throw std::invalid_argument(
             "options: solver = adam searches nothing, expected search.mode = automatic or off");
-    require(adam.epochs >= 1, "adam.epochs", adam.epochs, "at least 1");
-    require(adam.batch >= 1, "adam.batch", adam.batch, "at least 1");
-    require(adam.learning_rate > 0 && std::isfinite(adam.learning_rate), "adam.learning_rate",
-            adam.learning_rate, "a finite number > 0");
-    require(adam.fine_learning_rate > 0 && std::isfinite(adam.fine_learning_rate),
-            "adam.fine_learning_rate", adam.fine_learning_rate, "a finite number > 0");
-    require(adam.decay > 0 && adam.decay <= 1, "adam.decay", adam.decay, "a factor in (0, 1]");
-    require(adam.fine_from >= 0 && adam.fine_from <= 1, "adam.fine_from", adam.fine_from,
-            "a share in [0, 1]");
-    require(adam.translation_scales >= 1 && adam.translation_scales <= 3, "adam.translation_scales",
-            adam.translation_scales, "1 to 3");
+    adam.validate();
 }
 
 }  // namespace xcalib

@@ -61,7 +61,9 @@ std::vector<fs::path> list_files(const fs::path& folder, const std::vector<std::
         const std::string name = entry.path().filename().string();
         const bool wanted =
             std::find(suffixes.begin(), suffixes.end(), lower_suffix(name)) != suffixes.end();
-        if (!wanted || name[0] == '.' || !entry.is_regular_file()) continue;
+        // A link that leads nowhere stands for a frame, which cannot be decoded.
+        const bool dangles = entry.is_symlink() && !entry.exists();
+        if (!wanted || name[0] == '.' || !(entry.is_regular_file() || dangles)) continue;
         check_name(entry.path());
         names.push_back(name);
     }

@@ -31,6 +31,11 @@ class PickedDepth : public Depth {
     std::vector<int> indices_;
 };
 
+bool any_known(const ImageView& depth) {
+    const Image metres = clean_depth(depth);
+    return std::any_of(metres.pixels.begin(), metres.pixels.end(), [](float z) { return z > 0; });
+}
+
 }  // namespace
 
 Frames with_lag(const Frames& frames, int lag, std::vector<int>& chosen) {
@@ -76,7 +81,14 @@ LoadedFrames load_frames(const Frames& frames, const std::vector<int>& chosen,
     int done = 0;
     for (const int index : chosen) {
         try {
-            loaded.frames.push_back(frames.read(index));
+            Frame frame = frames.read(index);
+            if (!any_known(frame.depth.view)) {
+                const auto files = frames.depth->files(index);
+                throw DecodeError(
+                    (files.empty() ? frames.references->where(index) : files[0].string()) +
+                    ": all depth is unknown, expected some pixels above 0 m");
+            }
+            loaded.frames.push_back(std::move(frame));
             loaded.indices.push_back(index);
         } catch (const DecodeError& error) {
             if (loaded.failures++ == 0) loaded.first_failure = error.what();

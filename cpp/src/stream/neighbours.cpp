@@ -78,4 +78,8 @@ void add_lags(const LagReport& lag, const TimeOffset& offset, const Stream& all_
             : "try " + option_for_lag(offset, lag.frames, clock_of(all_sources.frames()).value()));
 }
 
+void distrust(const std::string& line, CalibrationResult& result) {
+    if (!line.empty()) result.distrust(line, "");
+}
+
 }  // namespace xcalib

@@ -159,7 +159,7 @@ float value_at(const char* bytes, std::size_t size, bool swapped) {
 
 }  // namespace
 
-Picture parse_npy(const std::string& data, const std::string& name) {
+Picture parse_npy(const std::string& data, const std::string& name, ArrayKind kind) {
     const auto damaged = [&] {
         return DecodeError(name + ": cannot decode, truncated or not a .npy array");
     };
@@ -180,33 +180,55 @@ Picture parse_npy(const std::string& data, const std::string& name) {
     for (const std::size_t side : array->shape)
         shape += (shape.empty() ? "" : ", ") + std::to_string(side);
     if (array->shape.size() == 1) shape += ",";
+    const bool is_image = kind == ArrayKind::image;
     std::vector<std::size_t> sides = array->shape;
-    if (sides.size() == 3 && sides[2] == 1) sides.pop_back();
-    if (sides.size() != 2 || sides[0] == 0 || sides[1] == 0)
-        throw InputError(name + ": depth has shape (" + shape + "), expected one channel (h, w)");
-    if (array->type != "f2" && array->type != "f4" && array->type != "f8")
-        throw InputError(name + ": depth is " + type_name(array->type) +
-                         ", expected floats in metres");
-    const std::size_t bytes = static_cast<std::size_t>(array->type[1] - '0');
-    const std::size_t height = sides[0], width = sides[1];
+    if (sides.size() == 2) sides.push_back(1);
+    const bool channels = sides.size() == 3 && (sides[2] == 1 || (is_image && sides[2] == 3));
+    if (!channels || sides[0] == 0 || sides[1] == 0)
+        throw InputError(name + (is_image ? ": the image" : ": depth") + " has shape (" + shape +
+                         "), expected " +
+                         (is_image ? "(h, w) or (h, w, 3)" : "one channel (h, w)"));
+    const std::string& type = array->type;
+    const bool is_float = type == "f2" || type == "f4" || type == "f8";
+    if (!is_float && type != "u2" && !(is_image && type == "u1"))
+        throw InputError(name + (is_image ? ": pixels are " : ": depth is ") + type_name(type) +
+                         (is_image ? ", expected uint8, uint16 or floats"
+                                   : ", expected floats in metres"));
+    const std::size_t bytes = static_cast<std::size_t>(type[1] - '0');
+    const std::size_t height = sides[0], width = sides[1], count = sides[2];
     // Both sides fit 31 bits: their product is exact.
-    if ((data.size() - start - length) / bytes < height * width) throw damaged();
+    if ((data.size() - start - length) / (bytes * count) < height * width) throw damaged();
 
     MutableImageView pixels;
-    Picture picture =
-        new_picture(static_cast<int>(width), static_cast<int>(height), 1, PixelType::f32, pixels);
+    const PixelType stored = is_float       ? PixelType::f32
+                             : type == "u2" ? PixelType::u16
+                                            : PixelType::u8;
+    Picture picture = new_picture(static_cast<int>(width), static_cast<int>(height),
+                                  static_cast<int>(count), stored, pixels);
     const char* values = data.data() + start + length;
-    auto* out = static_cast<float*>(pixels.data);
-    for (std::size_t y = 0; y < height; ++y)
-        for (std::size_t x = 0; x < width; ++x) {
-            const std::size_t at = array->fortran ? x * height + y : y * width + x;
-            out[y * width + x] = value_at(values + at * bytes, bytes, array->swapped);
-        }
+    const auto fill = [&](auto* out, const auto& value) {
+        for (std::size_t y = 0; y < height; ++y)
+            for (std::size_t x = 0; x < width; ++x)
+                for (std::size_t c = 0; c < count; ++c) {
+                    const std::size_t at =
+                        array->fortran ? (c * width + x) * height + y : (y * width + x) * count + c;
+                    *out++ = value(values + at * bytes);
+                }
+    };
+    if (is_float)
+        fill(static_cast<float*>(pixels.data),
+             [&](const char* at) { return value_at(at, bytes, array->swapped); });
+    else if (stored == PixelType::u16)
+        fill(static_cast<std::uint16_t*>(pixels.data),
+             [&](const char* at) { return number_at<std::uint16_t>(at, array->swapped); });
+    else
+        fill(static_cast<std::uint8_t*>(pixels.data),
+             [](const char* at) { return static_cast<std::uint8_t>(*at); });
     return picture;
 }
 
-Picture read_npy(const std::filesystem::path& file) {
-    return parse_npy(read_file(file), file.string());
+Picture read_npy(const std::filesystem::path& file, ArrayKind kind) {
+    return parse_npy(read_file(file), file.string(), kind);
 }
 
 }  // namespace xcalib

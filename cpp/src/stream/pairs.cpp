@@ -26,6 +26,16 @@ void require_times(const Stream& references, const Stream& sources) {
         throw InputError("a clock offset needs times of both streams' frames; expected them");
 }
 
+// One camera cannot be registered to itself.
+void expect_two(const Stream& references, const Stream& sources) {
+    if (references.size() == 0 || sources.size() == 0) return;
+    if (references.where(0) == sources.where(0) && std::filesystem::exists(references.file(0)))
+        throw InputError(references.where(0) +
+                         ": REFERENCE and SOURCE are the same frames; expected those of two"
+                         " cameras (#left and #right take the halves of wide frames, #top and"
+                         " #bottom of high ones)");
+}
+
 // RegisteredNec of the frames of streams, which must outlive it.
 PairScore scores_of(const Rig& rig, Stream& references, Stream& sources, Depth& depth) {
     struct State {
@@ -81,6 +91,7 @@ Pairs::Pairs(StreamPointer references, StreamPointer sources, const Matching& ma
         all_references_->times = read_times(matching.reference_times, *all_references_);
     if (!matching.source_times.empty())
         all_sources_->times = read_times(matching.source_times, *all_sources_);
+    expect_two(*all_references_, *all_sources_);
     reference_list_ = all_references_->frames();
     source_list_ = all_sources_->frames();
     const bool by_time = matching.method == "time" ||
@@ -97,8 +108,22 @@ Pairs::Pairs(StreamPointer references, StreamPointer sources, const Matching& ma
     pairing_ =
         pair_frames(reference_list_, source_list_, matching.method, offset, matching.max_gap);
     pairing_ = with_lag(pairing_, source_list_, matching.offset.frames);
-    if (pairing_.method == "time" || pairing_.lag != 0)
-        notes_.push_back("frames: " + pairing_.line());
+    // Frames of files that nothing but their order pairs may be strangers.
+    const bool by_order_alone = pairing_.method == "order" && matching.method == "auto" &&
+                                !reference_list_.paths.empty() && !source_list_.paths.empty();
+    if (pairing_.method == "time" || pairing_.lag != 0 || !pairing_.alone.empty() || by_order_alone)
+        notes_.push_back("frames: " + pairing_.line() +
+                         (by_order_alone ? ", for neither names nor numbers agree (--pair order"
+                                           " says that this is meant)"
+                                         : ""));
+}
+
+std::vector<std::string> Pairs::notes() const {
+    std::vector<std::string> lines;
+    for (const StreamPointer& stream : {all_references_, all_sources_})
+        if (!stream->said.empty()) lines.push_back(stream->said);
+    lines.insert(lines.end(), notes_.begin(), notes_.end());
+    return lines;
 }
 
 void Pairs::refine(const Rig& rig, const OpenDepth& open_depth) {

@@ -122,7 +122,30 @@ Half::Half(StreamPointer stream, std::string half)
       half_(std::move(half)) {}
 
 std::vector<double> read_times(const std::filesystem::path& table, const Stream& stream) {
-    return times_of_table(read_file(table), table.string(), stream.frames().names);
+    const std::string text = read_file(table);
+    const std::vector<double> in_order = times_in_order(text);
+    if (in_order.empty()) return times_of_table(text, table.string(), stream.frames().names);
+    if (static_cast<int>(in_order.size()) != stream.size())
+        throw InputError(table.string() + ": " + std::to_string(in_order.size()) +
+                         " times without names, for " + std::to_string(stream.size()) +
+                         " frames; expected as many, or lines `name timestamp`");
+    if (!std::is_sorted(in_order.begin(), in_order.end()))
+        throw InputError(table.string() + ": times fall, expected them to rise");
+    return in_order;
+}
+
+std::optional<std::vector<double>> times_beside(const std::vector<std::filesystem::path>& files,
+                                                const Stream& stream, std::string& said) {
+    for (const char* name : {"timestamps.csv", "timestamps.txt"}) {
+        if (files.empty()) break;
+        const std::filesystem::path table = files[0].parent_path() / name;
+        if (!std::filesystem::is_regular_file(table)) continue;
+        const std::size_t count = times_in_order(read_file(table)).size();
+        if (count == 0 || count == files.size()) return read_times(table, stream);
+        said = table.string() + ": " + std::to_string(count) + " times without names, for " +
+               std::to_string(files.size()) + " frames; not used";
+    }
+    return std::nullopt;
 }
 
 StreamPointer scalar_sources(StreamPointer sources, const std::string& colormap,

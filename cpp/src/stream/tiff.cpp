@@ -1,6 +1,9 @@
 #include "xcalib/stream/tiff.hpp"
 
 #include <cstdint>
+#include <set>
+
+#include "xcalib/error.hpp"
 
 namespace xcalib {
 namespace {
@@ -48,6 +51,47 @@ std::string tiff_pixel_type(std::string_view data) {
     if (bits < 8 || bits > 64 || format < 1 || format > 3) return "";
     static const char* const kNames[] = {"uint", "int", "float"};
     return kNames[format - 1] + std::to_string(bits);
+}
+
+void put_full_page_first(std::string& data, const std::string& name) {
+    const std::string_view order = std::string_view(data).substr(0, 2);
+    const bool big = order == "MM";
+    if (order != "II" && !big) return;
+    const Numbers number(data, big);
+    if (number(2, 2) != 42) return;
+    constexpr unsigned kWidth = 256, kHeight = 257;
+    std::size_t best = 0, area = 0, of_that_size = 0;
+    std::uint32_t sides[2] = {0, 0};
+    std::set<std::size_t> seen;  // for pages may be chained in a circle
+    for (std::size_t page = number(4, 4); page && seen.insert(page).second;) {
+        const std::size_t fields = number(page, 2);
+        std::uint32_t width = 0, height = 0;
+        for (std::size_t i = 0; i < fields; ++i) {
+            const std::size_t field = page + 2 + 12 * i;
+            const std::uint32_t tag = number(field, 2);
+            const std::uint32_t value = number(field + 8, number(field + 2, 2) == kShort ? 2 : 4);
+            if (tag == kWidth) width = value;
+            if (tag == kHeight) height = value;
+        }
+        const std::size_t own = std::size_t{width} * height;
+        if (own > area) {
+            area = own;
+            best = page;
+            of_that_size = 0;
+            sides[0] = width;
+            sides[1] = height;
+        }
+        of_that_size += own == area;
+        page = number(page + 2 + 12 * fields, 4);
+    }
+    if (seen.size() < 2 || area == 0) return;
+    if (of_that_size > 1)
+        throw InputError(
+            name + ": " + std::to_string(of_that_size) + " pages of " + std::to_string(sides[0]) +
+            "x" + std::to_string(sides[1]) +
+            ", expected one image; a TIFF stack is given by its file, not in a folder");
+    for (std::size_t i = 0; i < 4; ++i)
+        data[4 + (big ? 3 - i : i)] = static_cast<char>(best >> (8 * i) & 0xff);
 }
 
 }  // namespace xcalib

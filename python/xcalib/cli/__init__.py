@@ -53,6 +53,15 @@ class Commands(ErrorsInOneLine):
         command: click.Command = import_module(f"{__name__}.{name}").command
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that the arguments name, with those of its `--config` among them."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None and any(arg.startswith("--config") for arg in rest):
+            rest = import_module(f"{__name__}.config").expanded(command, rest)
+        return name, command, rest
+
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="xcalib-rgbt", prog_name="xcalib")

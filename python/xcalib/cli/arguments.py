@@ -10,9 +10,18 @@ from typing import Any
 import click
 
 from .. import _core
-from .._core import CalibrationOptions, Rig, _option_words
+from .._core import (
+    CalibrationOptions,
+    DepthUnits,
+    Rig,
+    _option_words,
+    depth_choices,
+    depth_unit_of,
+    plan_text,
+)
 from ..depth import MeasuredDepth, NetworkOptions, PlaneDepth
 from ..footage import Matching
+from ..frames import InputError
 from ..inputs import Inputs
 from ..pipeline import Frames
 from .depth_options import DEPTH_OPTIONS
@@ -31,6 +40,18 @@ frames_arguments = options(
     click.argument("source", type=Input()),
     *DEPTH_OPTIONS,
     *FOOTAGE_OPTIONS,
+    click.option(
+        "--config",
+        metavar="FILE",
+        expose_value=False,
+        help="Take arguments from a YAML file, by their names without dashes (reference, source,"
+        " depth, ...); those given here go before.",
+    ),
+    click.option(
+        "--dry-run",
+        is_flag=True,
+        help="Print what would be read, paired and written, and do no more.",
+    ),
 )
 
 quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
@@ -64,6 +85,19 @@ def load_rig(path: Path) -> Rig:
 rig_argument = click.argument("rig_file", metavar="RIG", type=Input())
 
 
+def units_of(arguments: Mapping[str, Any]) -> DepthUnits:
+    """What the numbers of depth maps mean, by the names of the command's parameters."""
+    scale, unit = arguments["depth_scale"], arguments["depth_unit"]
+    if scale is not None and unit is not None:
+        raise click.UsageError(
+            "--depth-unit and --depth-scale both say the unit, expected one of them"
+        )
+    return DepthUnits(
+        scale=depth_unit_of(unit) if unit is not None else scale,
+        invalid=list(arguments["depth_invalid"]),
+    )
+
+
 def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
     """The values of `frames_arguments`, by the names of the command's parameters."""
     a = arguments
@@ -71,7 +105,7 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
         a["reference"],
         a["source"],
         a["depth_spec"],
-        a["depth_scale"],
+        units_of(a),
         Matching(
             a["pairing"],
             None if a["time_offset"].automatic else a["time_offset"].seconds,
@@ -96,6 +130,8 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
 
 def open_frames(arguments: Mapping[str, Any], threads: int, rig: Rig | None) -> Frames:
     """Open what `frames_arguments` names, and print how frames were paired by time."""
+    if arguments["depth_spec"] is None:
+        raise InputError(depth_choices())
     frames = Frames.open(inputs_of(arguments, threads), rig)
     for note in frames.notes:
         click.echo(note, err=True)
@@ -127,3 +163,18 @@ def with_scalar_sources(frames: Frames, colormap: str) -> Frames:
     if line:
         click.echo(line, err=True)
     return frames
+
+
+def say_depth(frames: Frames) -> None:
+    """What the numbers of the depth maps were taken for, once it is known that they will do."""
+    if frames.depth_line:
+        click.echo(frames.depth_line)
+
+
+def print_plan(frames: Frames, outputs: Sequence[Path | None], chosen: Sequence[int] = ()) -> None:
+    """What a run would read, pair, choose and write."""
+    click.echo(plan_text(frames.references, frames.sources, frames.depth, list(chosen)))
+    say_depth(frames)
+    for path in outputs:
+        if path is not None:
+            click.echo(f"would be written: {path}")

@@ -16,6 +16,7 @@ from .._core import (
     Pinhole,
     Tolerance,
     _flow_arguments,
+    draw_frames,
     left_out,
     report_document,
 )
@@ -33,12 +34,15 @@ from .arguments import (
     frames_arguments,
     load_rig,
     open_frames,
+    print_plan,
     quiet_option,
+    say_depth,
     threads_option,
     with_scalar_sources,
 )
 from .errors import NOT_TRUSTED, stop, warn
 from .options import ARGUMENTS, Input, Output
+from .sections import Sectioned
 
 LAG_ROUNDS = 2
 """Times at most that a lag is taken up, each of some frames."""
@@ -119,7 +123,7 @@ def frames_again(arguments: list[str], lag: int) -> Frames:
     return frames.with_lag(lag, [])[0] if lag else frames
 
 
-@click.command("calibrate")
+@click.command("calibrate", cls=Sectioned)
 @frames_arguments
 @click.option(
     "-o",
@@ -307,6 +311,7 @@ def command(
     refine_plane: bool,
     report_file: Path | None,
     quiet: bool,
+    dry_run: bool,
     **inputs: Any,
 ) -> None:
     """Estimate both cameras and their pose, and write a rig file.
@@ -383,6 +388,10 @@ def command(
                 raise InputError(f"none of {len(choice.candidates)} frames can be used; {why}")
             warn(left_out(len(choice.unusable), why))
         indices = choice.indices
+    if dry_run:
+        used = draw_frames(len(frames), max_frames, seed) if indices is None else indices
+        print_plan(frames, [output, report_file], used)
+        return
     result, chosen = run_calibration(
         frames, calibration, initial_rig, quiet, set_cameras, indices, warn, flow
     )
@@ -419,5 +428,6 @@ def command(
         else:
             write_bytes(report_file, document.encode())
         click.echo(f"report: {report_file}")
+    say_depth(frames)
     if not result.converged:
         stop(NOT_TRUSTED, result.report.message)

@@ -7,23 +7,49 @@ from typing import Any
 
 import click
 
-from ..depth import PNG_SCALE, MeasuredDepth, PlaneDepth
+from ..depth import MeasuredDepth, PlaneDepth
 from .options import file, number
 
 PLANE = PlaneDepth()
+
+
+def numbers_of(ctx: click.Context, param: click.Parameter, value: str) -> tuple[float, ...]:
+    """Parse ``N,N``."""
+    try:
+        return tuple(float(part) for part in value.split(",")) if value else ()
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is not a list of numbers N,N") from None
+
 
 DEPTH_OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--depth",
         "depth_spec",
         metavar="DEPTH",
-        required=True,
-        help="Folder with a depth map per reference image (16-bit PNG; .npy, .tiff, .exr in m;"
-        " 0 unknown) or lidar scan (.bin, .pcd, .ply), `stereo:FOLDER` of the right camera's"
-        " images, a bag with a topic of depth (drive.mcap#/depth), an .onnx file of a network, or"
-        " `plane` for a flat road.",
+        help="Folder with a depth map per reference image (16-bit PNG; .npy, .npz, .pfm, .tiff,"
+        " .exr in m; 0 unknown) or lidar scan (.bin, .pcd, .ply), `stereo:FOLDER` of the right"
+        " camera's images, `disparity:FOLDER`, a bag with a topic of depth (drive.mcap#/depth), an"
+        " .onnx file of a network, `plane` for a flat road, or one distance in metres.",
     ),
-    number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256"),
+    click.option(
+        "--depth-scale",
+        metavar="M",
+        type=float,
+        help="Metres per count of depth maps (px of disparities).  [default: 1/256 of 16-bit PNG, 1"
+        " of floats]",
+    ),
+    click.option(
+        "--depth-unit",
+        metavar="UNIT",
+        help="The same in words: mm, cm, m, or 1/256 of a metre.",
+    ),
+    click.option(
+        "--depth-invalid",
+        metavar="N[,N]",
+        default="",
+        callback=numbers_of,
+        help="Numbers of depth maps that mean unknown, besides 0, NaN and 65535.",
+    ),
     number(
         "--camera-height",
         "M",
@@ -81,24 +107,25 @@ DEPTH_OPTIONS: tuple[Callable[[Any], Any], ...] = (
         "--lidar-calibration",
         "Lidar: calibration of camera and lidar (YAML or KITTI's .txt; a folder of the latter).",
     ),
-    file("--stereo-calibration", "Stereo: YAML with baseline, focal and doffs."),
+    file("--stereo-calibration", "Stereo, disparity: YAML with baseline, focal and doffs."),
     click.option(
         "--stereo-baseline",
         metavar="M",
         type=float,
-        help="Stereo: distance of the partner, right of the reference camera [m].",
+        help="Stereo, disparity: distance of the partner, right of the reference camera [m].",
     ),
     click.option(
         "--stereo-focal",
         metavar="PX",
         type=float,
-        help="Stereo: focal length of the rectified images [px].",
+        help="Stereo, disparity: focal length of the rectified images [px].",
     ),
     click.option(
         "--stereo-doffs",
         metavar="PX",
         type=float,
-        help="Stereo: principal point of the partner minus the reference's [px].  [default: 0]",
+        help="Stereo, disparity: principal point of the partner minus the reference's [px]."
+        "  [default: 0]",
     ),
     click.option("--complete", is_flag=True, help="Fill unknown depth along image edges."),
     number(

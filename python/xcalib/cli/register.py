@@ -15,15 +15,20 @@ from .arguments import (
     given_files,
     load_rig,
     open_frames,
+    print_plan,
     quiet_option,
     rig_argument,
+    say_depth,
     threads_option,
 )
 from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Output
+from .sections import Sectioned
 
 
-@click.command("register", short_help="Bring SOURCE images onto the REFERENCE pixels.")
+@click.command(
+    "register", cls=Sectioned, short_help="Bring SOURCE images onto the REFERENCE pixels."
+)
 @rig_argument
 @frames_arguments
 @click.option(
@@ -66,6 +71,7 @@ def command(
     occlusion: str,
     threads: int,
     quiet: bool,
+    dry_run: bool,
     **inputs: Any,
 ) -> None:
     """Bring every SOURCE image onto the pixels of its REFERENCE image.
@@ -76,10 +82,14 @@ def command(
     """
     rig = load_rig(rig_file)
     frames = open_frames(inputs, threads, rig)
+    if dry_run:
+        print_plan(frames, [output])
+        return
     how = RegistrationOptions(threads, overlays, nearest, occlusion, overwrite)
     reads = [rig_file, *given_files(inputs)]
     total = run_registration(frames, rig, output, how, inputs, quiet, reads)
     click.echo(f"{total.summary()}: {output}")
+    say_depth(frames)
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")
     require_trusted(rig, rig_file)

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from .._core import DepthUnits
 from ..frames import InputError
+from .constant import ConstantDepth, distance_of
 from .files import DEPTH_SUFFIXES, PNG_SCALE, FolderDepth, read_depth
 from .measured import MeasuredDepth
 from .network import NetworkDepth, NetworkOptions
@@ -20,8 +22,10 @@ from .provider import Depth, DepthProvider, WrappedDepth
 __all__ = [
     "DEPTH_SUFFIXES",
     "PNG_SCALE",
+    "ConstantDepth",
     "Depth",
     "DepthProvider",
+    "DepthUnits",
     "FolderDepth",
     "MeasuredDepth",
     "NetworkDepth",
@@ -36,7 +40,7 @@ __all__ = [
 def open_depth(
     spec: str | Path,
     reference_paths: Sequence[Path],
-    scale: float = PNG_SCALE,
+    units: DepthUnits | None = None,
     plane: PlaneDepth | None = None,
     network: NetworkOptions | None = None,
     measured: MeasuredDepth | None = None,
@@ -46,13 +50,13 @@ def open_depth(
     Parameters
     ----------
     spec
-        A folder of depth maps, the .onnx file of a network, or the word ``plane`` (a folder of
-        that name: ``./plane``); a folder of lidar scans or ``stereo:FOLDER`` with the options of
-        ``measured`` for them.
+        A folder of depth maps, the .onnx file of a network, the word ``plane`` (a folder of that
+        name: ``./plane``), or a distance in metres; a folder of lidar scans, ``stereo:FOLDER`` or
+        ``disparity:FOLDER`` with the options of ``measured`` for them.
     reference_paths
         Files of the reference images, in the order of the frames.
-    scale
-        Metres per count of 16-bit PNG depth.
+    units
+        What the numbers of depth maps mean.
     plane
         The prior used for ``plane``.
     network
@@ -63,14 +67,15 @@ def open_depth(
     measured = measured or MeasuredDepth()
     provider = measured.open(str(spec), reference_paths)
     if provider is None:
-        provider = _open_given(spec, reference_paths, scale, plane, network)
+        folder, units = measured.maps(str(spec), units or DepthUnits())
+        provider = _open_given(folder, reference_paths, units, plane, network)
     return measured.conditioned(provider)
 
 
 def _open_given(
     spec: str | Path,
     reference_paths: Sequence[Path],
-    scale: float,
+    units: DepthUnits,
     plane: PlaneDepth | None,
     network: NetworkOptions | None,
 ) -> DepthProvider:
@@ -78,8 +83,11 @@ def _open_given(
         return plane or PlaneDepth()
     if Path(spec).suffix.lower() == ".onnx" and not Path(spec).is_dir():
         return NetworkDepth(spec, network)
+    if (metres := distance_of(spec)) is not None:
+        return ConstantDepth(metres)
     if not Path(spec).is_dir():
         raise InputError(
-            f"depth {spec}: expected an existing folder of depth maps, an .onnx file, or `plane`"
+            f"depth {spec}: expected an existing folder of depth maps, an .onnx file, `plane`, or a"
+            " distance in metres"
         )
-    return FolderDepth(spec, reference_paths, scale)
+    return FolderDepth(spec, reference_paths, units)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import read_npy
+from .._core import DepthUnits, metres_of, read_array, units_line
 from ..frames import Image, InputError, decode, list_files, pair, same_aspect, size_of
 from .provider import Depth, DepthProvider
 
-DEPTH_SUFFIXES = (".png", ".npy", ".tif", ".tiff", ".exr")
+DEPTH_SUFFIXES = (".png", ".npy", ".npz", ".pfm", ".tif", ".tiff", ".exr")
 PNG_SCALE = 1 / 256
 """Metres per count of a 16-bit PNG (KITTI)."""
 
@@ -28,56 +28,68 @@ class FolderDepth(DepthProvider):
     looks_at_reference = False
 
     def __init__(
-        self, folder: str | Path, reference_paths: Sequence[Path], scale: float = PNG_SCALE
+        self,
+        folder: str | Path,
+        reference_paths: Sequence[Path],
+        units: DepthUnits | None = None,
     ) -> None:
-        if not 0 < scale < math.inf:
-            raise InputError(f"depth scale is {scale:g}, expected above 0 m per count")
+        self.units = units or DepthUnits()
+        self.units.validate()
         self.paths = [
             depth for _, depth in pair(reference_paths, list_files(folder, DEPTH_SUFFIXES))
         ]
-        self.scale = scale
 
     def __call__(self, index: int, reference: Image) -> Depth:
         path = self.paths[index]
-        return fitting(read_depth(path, self.scale), reference, str(path))
+        return fitting(read_depth(path, self.units), reference, str(path))
 
     def files_of(self, index: int) -> list[Path]:
         return [self.paths[index]]
 
+    def line(self) -> str:
+        try:
+            first = self.paths[0]
+            return units_line(read_numbers(first), self.units, str(first), is_png(first))
+        except InputError:
+            return ""  # which is said when the map is needed
 
-def read_depth(path: str | Path, scale: float = PNG_SCALE) -> Depth:
-    """Read one depth map: ``(h, w)`` float32 [m], 0 where it is not positive and finite.
+
+def read_depth(path: str | Path, units: DepthUnits | None = None) -> Depth:
+    """Read one depth map: ``(h, w)`` float32 [m], 0 where it is unknown.
 
     Parameters
     ----------
     path
-        16-bit PNG in counts of ``scale``; or .npy, .tiff, .exr in metres.
-    scale
-        Metres per count of a PNG.
+        16-bit PNG; or .npy, .npz, .pfm, .tiff, .exr in metres.
+    units
+        What its numbers mean; None: 1/256 m a count of a PNG, metres of floats.
     """
     path = Path(path)
-    values = _read_values(path)
+    return metres_of(read_numbers(path), units or DepthUnits(), str(path), is_png(path))
+
+
+def is_png(path: Path) -> bool:
+    """Whether counts are of 1/256 m where nothing else is said."""
+    return path.suffix.lower() == ".png"
+
+
+def read_numbers(path: Path) -> NDArray[Any]:
+    """The numbers of one depth map as they are stored: (h, w) uint16 or float32."""
+    array = read_array(path, is_image=False)
+    if array is not None:
+        return array
+    values = _decoded(path)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
     if values.ndim != 2:
         raise InputError(f"{path}: depth has shape {values.shape}, expected one channel (h, w)")
-    if path.suffix.lower() == ".png":
-        if values.dtype != np.uint16:
-            raise InputError(f"{path}: depth is {values.dtype}, expected a 16-bit PNG")
-        depth = values.astype(np.float32) * np.float32(scale)
-    else:
-        if not np.issubdtype(values.dtype, np.floating):
-            raise InputError(f"{path}: depth is {values.dtype}, expected floats in metres")
-        depth = values.astype(np.float32)
-    return known(depth, str(path))
-
-
-def known(depth: Depth, where: str) -> Depth:
-    """The map with 0, in place, where it is not positive and finite; some pixel must be."""
-    depth[~((depth > 0) & np.isfinite(depth))] = 0
-    if not depth.any():
-        raise InputError(f"{where}: all depth is unknown, expected some pixels above 0 m")
-    return depth
+    if is_png(path) and values.dtype != np.uint16:
+        raise InputError(f"{path}: depth is {values.dtype}, expected a 16-bit PNG")
+    if np.issubdtype(values.dtype, np.floating):
+        return values.astype(np.float32)
+    if values.dtype != np.uint16:
+        raise InputError(f"{path}: depth is {values.dtype}, expected floats in metres")
+    return values
 
 
 def fitting(depth: Depth, reference: Image, where: str) -> Depth:
@@ -91,26 +103,23 @@ def fitting(depth: Depth, reference: Image, where: str) -> Depth:
     return depth
 
 
-def _read_values(path: Path) -> NDArray[np.generic]:
-    suffix = path.suffix.lower()
-    if suffix == ".npy":
-        return read_npy(path).copy()
-    if suffix == ".exr":
-        if importlib.util.find_spec("OpenEXR"):
-            return _read_exr(path)
-        # OpenCV reads EXR only on request, and its pip wheels are built without it.
-        os.environ.setdefault("OPENCV_IO_ENABLE_OPENEXR", "1")
-        try:
-            return decode(path)
-        except InputError as error:
-            raise InputError(
-                f"{error}, or this OpenCV is built without OpenEXR (as the pip wheels are):"
-                " `pip install OpenEXR`; .npy and .tiff in metres are read everywhere"
-            ) from None
-    return decode(path)
+def _decoded(path: Path) -> NDArray[Any]:
+    if path.suffix.lower() != ".exr":
+        return decode(path)
+    if importlib.util.find_spec("OpenEXR"):
+        return _read_exr(path)
+    # OpenCV reads EXR only on request, and its pip wheels are built without it.
+    os.environ.setdefault("OPENCV_IO_ENABLE_OPENEXR", "1")
+    try:
+        return decode(path)
+    except InputError as error:
+        raise InputError(
+            f"{error}, or this OpenCV is built without OpenEXR (as the pip wheels are):"
+            " `pip install OpenEXR`; .npy and .tiff in metres are read everywhere"
+        ) from None
 
 
-def _read_exr(path: Path) -> NDArray[np.generic]:
+def _read_exr(path: Path) -> NDArray[Any]:
     """The only channel of an EXR file, or the one named Z, by the optional package OpenEXR."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")

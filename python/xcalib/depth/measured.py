@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from .._core import DepthUnits
 from ..frames import InputError
 from .completion import MIN_CONFIDENCE, CompletedDepth
 from .conditioning import SteadyDepth
@@ -14,6 +15,7 @@ from .provider import DepthProvider
 from .stereo import StereoDepth, StereoGeometry, read_stereo_geometry
 
 STEREO = "stereo:"
+DISPARITY = "disparity:"
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,10 @@ class MeasuredDepth:
             if self.lidar_calibration is not None:
                 raise InputError(f"--lidar-calibration goes with scans, not with --depth {spec}")
             return StereoDepth(spec.removeprefix(STEREO), reference_paths, self._geometry())
-        if stereo:
-            raise InputError(f"depth {spec}: stereo options go with --depth {STEREO}FOLDER")
+        if stereo and not spec.startswith(DISPARITY):
+            raise InputError(
+                f"depth {spec}: stereo options go with --depth {STEREO}FOLDER or {DISPARITY}FOLDER"
+            )
         if self.lidar_calibration is None:
             return None
         if spec == "plane" or not Path(spec).is_dir():
@@ -53,7 +57,20 @@ class MeasuredDepth:
             )
         return LidarDepth(spec, reference_paths, self.lidar_calibration)
 
-    def _geometry(self) -> StereoGeometry:
+    def maps(self, spec: str, units: DepthUnits) -> tuple[str, DepthUnits]:
+        """The folder of a ``--depth`` that names depth maps or disparities, and their units."""
+        if not spec.startswith(DISPARITY):
+            return spec, units
+        g = self._geometry(DISPARITY)
+        return spec.removeprefix(DISPARITY), DepthUnits(
+            scale=units.scale,
+            invalid=units.invalid,
+            baseline=g.baseline,
+            focal=g.focal,
+            doffs=g.doffs,
+        )
+
+    def _geometry(self, prefix: str = STEREO) -> StereoGeometry:
         if self.stereo_calibration is not None:
             if (self.stereo_baseline, self.stereo_focal, self.stereo_doffs) != (None, None, None):
                 raise InputError(
@@ -63,7 +80,7 @@ class MeasuredDepth:
             return read_stereo_geometry(self.stereo_calibration)
         if self.stereo_baseline is None or self.stereo_focal is None:
             raise InputError(
-                "--depth stereo: expected --stereo-baseline and --stereo-focal,"
+                f"--depth {prefix} expected --stereo-baseline and --stereo-focal,"
                 " or --stereo-calibration"
             )
         return StereoGeometry(self.stereo_baseline, self.stereo_focal, self.stereo_doffs or 0.0)

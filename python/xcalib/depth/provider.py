@@ -57,6 +57,10 @@ class DepthProvider:
         """Files that the depth of a frame is made from, as far as they are known."""
         return []
 
+    def line(self) -> str:
+        """For the user: what its numbers are taken for, in a line, or ''."""
+        return ""
+
 
 @dataclass(frozen=True)
 class WrappedDepth(DepthProvider):
@@ -78,3 +82,6 @@ class WrappedDepth(DepthProvider):
 
     def files_of(self, index: int) -> list[Path]:
         return self.provider.files_of(index)
+
+    def line(self) -> str:
+        return self.provider.line()

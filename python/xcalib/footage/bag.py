@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import Lens
+from .._core import Lens, natural_order
 from ..frames import DecodeError, Image, InputError, as_image, is_truncated, quiet_opencv
 from .stream import Stream, Times
 
@@ -55,15 +56,34 @@ ENCODINGS: dict[str, tuple[type[np.generic], int, int | None]] = {
         for pattern in ("rggb", "bggr", "gbrg", "grbg")
         for bits, dtype in ((8, np.uint8), (16, np.uint16))
     },
+    "8UC4": (np.uint8, 4, cv2.COLOR_BGRA2BGR),
+    "16SC1": (np.int16, 1, None),
     "yuv422_yuy2": (np.uint8, 2, cv2.COLOR_YUV2BGR_YUY2),
+    "yuyv": (np.uint8, 2, cv2.COLOR_YUV2BGR_YUY2),
     "yuv422": (np.uint8, 2, cv2.COLOR_YUV2BGR_UYVY),
+    "uyvy": (np.uint8, 2, cv2.COLOR_YUV2BGR_UYVY),
+    "nv21": (np.uint8, 1, cv2.COLOR_YUV2BGR_NV21),
 }
+PLANAR = {"nv21": 1.5}
+"""Encodings with planes below each other: rows of the message for each row of the image."""
+
+REPAIR = {
+    ".bag": "`rosbag reindex` (of ROS 1) repairs those that were cut short",
+    ".mcap": "`mcap recover` repairs those that were cut short",
+}
+"""By suffix."""
 
 
 def is_bag(path: Path) -> bool:
-    """Whether the path is a bag: a file of its suffixes, or a ROS 2 folder."""
+    """Whether the path is a bag: a file of its suffixes (also a pattern of them, the parts of a
+    split one), a ROS 2 folder, or a folder with the parts of a ROS 1 bag and nothing else.
+    """
     if path.suffix.lower() in BAG_SUFFIXES:
         return True
+    if path.is_dir():
+        files = [file for file in path.iterdir() if not file.name.startswith(".")]
+        if files and all(file.suffix.lower() == ".bag" for file in files):
+            return True
     metadata = path / "metadata.yaml"  # a name that folders of images may use too
     return metadata.is_file() and b"rosbag2_bagfile_information" in metadata.read_bytes()
 
@@ -97,7 +117,9 @@ class BagImages(Stream):
             raise
         except Exception as error:  # each storage of rosbags has errors of its own
             where = self.where(len(stamps))
-            raise InputError(f"{where}: not readable, the bag is damaged: {error}") from None
+            raise InputError(
+                f"{where}: not readable, the bag is damaged: {error}{repair_hint(path)}"
+            ) from None
         if not stamps:
             raise InputError(f"{path}#{self.topic}: no message, expected images")
         self.flaws, usable = _flaws(stamps)
@@ -210,19 +232,42 @@ def _opened(path: Path) -> AnyReader:
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise InputError(f"{path}: bags need the library rosbags, `pip install rosbags`") from None
-    if not path.exists():
-        raise InputError(f"{path}: no such bag")
+    paths = _parts(path)
     try:
         # Bags in sqlite before ROS Iron carry no definitions of their messages.
-        bag = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        bag = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         bag.open()
     except Exception as error:  # each storage of rosbags has errors of its own
-        raise InputError(f"{path}: not a readable bag: {error}") from None
+        raise InputError(f"{path}: not a readable bag: {error}{repair_hint(path)}") from None
     return bag
+
+
+def _parts(path: Path) -> list[Path]:
+    """The files of a bag that is split in several, by a pattern or in a folder; else itself."""
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        parts = list(path.glob("*.bag"))
+    elif not path.exists() and "*" in path.name:
+        parts = list(path.parent.glob(path.name))
+    else:
+        parts = [path]
+    if not parts or not parts[0].exists():
+        raise InputError(f"{path}: no such bag")
+    return [parts[index] for index in natural_order([str(part) for part in parts])]
+
+
+def repair_hint(path: Path) -> str:
+    """The tool that repairs a bag of this kind, to end a message with."""
+    hint = REPAIR.get(path.suffix.lower(), "`ros2 bag reindex` repairs those that were cut short")
+    return f"; {hint}"
 
 
 def _topics(bag: AnyReader, *kinds: str) -> dict[str, str]:
     return {c.topic: c.msgtype for c in bag.connections if c.msgtype in kinds}
+
+
+def _one_slash(topic: str) -> str:
+    """As ROS takes names: slashes that follow each other are one."""
+    return re.sub("/+", "/", topic)
 
 
 def _image_topic(bag: AnyReader, path: Path, topic: str) -> tuple[str, str]:
@@ -230,6 +275,9 @@ def _image_topic(bag: AnyReader, path: Path, topic: str) -> tuple[str, str]:
     found = _topics(bag, RAW, COMPRESSED)
     if not topic and len(found) == 1:
         return next(iter(found.items()))
+    for name, kind in found.items():
+        if topic and _one_slash(name).strip("/") == _one_slash(topic).strip("/"):
+            return name, kind
     if topic not in found:
         names = ", ".join(sorted(found)) or "none"
         raise InputError(
@@ -248,16 +296,19 @@ def _unpacked(message: Any, where: str) -> Image:
     width, height, step = message.width, message.height, message.step
     pixel = np.dtype(dtype).itemsize * channels
     data: NDArray[np.uint8] = np.asarray(message.data, np.uint8)
-    if min(width, height) < 1 or step < width * pixel or data.size < step * height:
+    all_rows = int(height * PLANAR.get(message.encoding, 1))
+    if min(width, height) < 1 or step < width * pixel or data.size < step * all_rows:
         raise DecodeError(
             f"{where}: {data.size} bytes, rows of {step}, are no {width}x{height}"
             f" {message.encoding} image"
         )
-    rows = np.ascontiguousarray(data[: step * height].reshape(height, step)[:, : width * pixel])
+    rows = np.ascontiguousarray(data[: step * all_rows].reshape(all_rows, step)[:, : width * pixel])
     order: Literal["<", ">"] = ">" if message.is_bigendian else "<"
     image: Image = rows.view(np.dtype(dtype).newbyteorder(order)).astype(dtype, copy=False)
     if channels > 1:
         image = image.reshape(height, width, channels)
+    if dtype == np.int16:
+        return image.astype(np.float32)  # which holds all of it
     return image.copy() if conversion is None else cv2.cvtColor(image, conversion)
 
 
@@ -314,8 +365,15 @@ class CameraInfo:
     """Coefficients of the model."""
 
     @property
+    def is_calibrated(self) -> bool:
+        """Whether it says anything: drivers without a calibration leave K at 0."""
+        return bool(self.K[0, 0] != 0)
+
+    @property
     def lens(self) -> Lens | None:
-        """The lens of the model; None where there is no such."""
+        """The lens of the model; None where there is no such, or no calibration."""
+        if not self.is_calibrated:
+            return None
         model = LENSES.get(self.model)
         if not self.D.any() and model != "fisheye":
             return Lens()
@@ -331,6 +389,8 @@ class CameraInfo:
         bent = f"distortion {self.model} {numbers}, which no lens here is"
         if (lens := self.lens) is not None:
             bent = f"lens {lens.model}" + (f":{numbers}" if lens.coefficients else "")
+        if not self.is_calibrated:
+            return f"{self.topic}: {self.width}x{self.height} px, uncalibrated (K is all 0)"
         return (
             f"{self.topic}: {self.width}x{self.height} px,"
             f" FX,FY,CX,CY {fx:.6g},{fy:.6g},{cx:.6g},{cy:.6g} px, {bent}"
@@ -349,8 +409,28 @@ def lens_of_topic(name: str | Path) -> Lens | None:
     for info in infos:
         beside = info.topic.rpartition("/")[0]
         if f"{topic}/".startswith(f"{beside}/") or (not topic and len(infos) == 1):
-            return info.lens
+            # What is rectified has been through the lens, and P is its camera.
+            return Lens() if is_rectified(topic) and info.is_calibrated else info.lens
     return None
+
+
+def is_rectified(topic: str) -> bool:
+    """Whether the images of a topic are rectified, by ROS' names for them: image_rect, ..."""
+    return "rect" in topic.rpartition("/")[2].split("_")
+
+
+def _on_its_image(message: Any, K: NDArray[np.float64]) -> tuple[int, int, NDArray[np.float64]]:
+    """Size and matrix of the image that is published: camera_info's are of the full sensor, of
+    which a region may be read out, and pixels binned.
+    """
+    roi = message.roi
+    width, height = roi.width or message.width, roi.height or message.height
+    bins = np.array([max(1, message.binning_x), max(1, message.binning_y)], np.float64)
+    on_image = K.copy()
+    on_image[:2, 2] -= (roi.x_offset, roi.y_offset)
+    on_image[:2, :2] /= bins[:, None]
+    on_image[:2, 2] = (on_image[:2, 2] + 0.5) / bins - 0.5
+    return int(width // bins[0]), int(height // bins[1]), on_image
 
 
 def camera_infos(path: str | Path) -> list[CameraInfo]:
@@ -364,12 +444,16 @@ def camera_infos(path: str | Path) -> list[CameraInfo]:
                 message: Any = bag.deserialize(data, connection.msgtype)
                 # ROS 1 has capital names for what ROS 2 has in small ones.
                 K, D = (getattr(message, n, getattr(message, n.upper(), None)) for n in "kd")
+                matrix = np.asarray(K, np.float64).reshape(3, 3)
+                width, height = message.width, message.height
+                if matrix[0, 0] != 0:
+                    width, height, matrix = _on_its_image(message, matrix)
                 infos.append(
                     CameraInfo(
                         topic,
-                        message.width,
-                        message.height,
-                        np.asarray(K, np.float64).reshape(3, 3),
+                        width,
+                        height,
+                        matrix,
                         message.distortion_model,
                         np.asarray(D, np.float64),
                     )

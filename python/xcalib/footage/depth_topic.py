@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from .._core import DepthUnits, metres_of, units_line
 from ..depth import Depth, DepthProvider
-from ..depth.files import fitting, known
+from ..depth.files import fitting
 from ..frames import Image, InputError
 from .bag import is_bag
 from .stream import Stream
 
-MILLIMETRE = np.float32(1e-3)
+MILLIMETRE = 1e-3
 
 
 def is_depth_topic(spec: str) -> bool:
@@ -31,10 +32,29 @@ class TopicDepth(DepthProvider):
 
     looks_at_reference = False
 
-    def __init__(self, stream: Stream) -> None:
+    def __init__(self, stream: Stream, units: DepthUnits | None = None) -> None:
         self.stream = stream
+        self.units = units or DepthUnits()
 
     def __call__(self, index: int, reference: Image) -> Depth:
+        numbers, where = self._numbers(index), self.stream.where(index)
+        metres = metres_of(numbers, self._units_of(numbers), where, is_png=False)
+        return fitting(metres, reference, where)
+
+    def _units_of(self, numbers: Image) -> DepthUnits:
+        units = self.units
+        if units.scale is not None or numbers.dtype != np.uint16:
+            return units
+        return DepthUnits(scale=MILLIMETRE, invalid=units.invalid)
+
+    def line(self) -> str:
+        try:
+            numbers = self._numbers(0)
+        except InputError:
+            return ""
+        return units_line(numbers, self._units_of(numbers), self.stream.where(0), is_png=False)
+
+    def _numbers(self, index: int) -> Image:
         image, where = self.stream[index], self.stream.where(index)
         if image.ndim != 2 or image.dtype not in (np.uint16, np.float32):
             shape = "x".join(map(str, image.shape))
@@ -42,8 +62,7 @@ class TopicDepth(DepthProvider):
                 f"{where}: depth is {shape} {image.dtype}, expected 32FC1 in metres or 16UC1 in"
                 " millimetres"
             )
-        metres = image * MILLIMETRE if image.dtype == np.uint16 else image
-        return fitting(known(metres.astype(np.float32), where), reference, where)
+        return image
 
     def files_of(self, index: int) -> list[Path]:
         return [self.stream.file(index)]

@@ -11,21 +11,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .._core import natural_order, read_times, times_of_names
+from .._core import natural_order, times_beside, times_of_names
 from ..frames import (
+    ARRAY_SUFFIXES,
     IMAGE_SUFFIXES,
     DecodeError,
     Image,
     InputError,
     as_image,
-    list_files,
+    list_images,
     quiet_opencv,
     read_image,
 )
 from .stream import Stream
-
-TIME_TABLES = ("timestamps.csv", "timestamps.txt")
-"""Read, if there, from the folder of the images."""
 
 
 class ImageFiles(Stream):
@@ -38,9 +36,9 @@ class ImageFiles(Stream):
         self.paths = list(paths)
         times = times_of_names([path.stem for path in self.paths])
         self.times = None if times is None else np.array(times)
-        for table in TIME_TABLES:
-            if self.paths and (self.paths[0].parent / table).is_file():
-                self.times = np.array(read_times(self.paths[0].parent / table, self))
+        beside = times_beside(self.paths, self)
+        if beside is not None:
+            self.times = np.array(beside)
 
     def __len__(self) -> int:
         return len(self.paths)
@@ -74,7 +72,11 @@ def matching_files(pattern: Path) -> list[Path]:
         found = [path for path in files if name.fullmatch(path.name)]
     else:
         found = [Path(path) for path in glob.glob(str(pattern))]
-    found = [path for path in found if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file()]
+    found = [
+        path
+        for path in found
+        if path.suffix.lower() in IMAGE_SUFFIXES + ARRAY_SUFFIXES and path.is_file()
+    ]
     if not found:
         raise InputError(f"{pattern}: no image file matches")
     return [found[index] for index in natural_order([str(path) for path in found])]
@@ -118,7 +120,7 @@ class Pages(Stream):
 def open_files(path: Path) -> Stream | None:
     """The stream of a folder, a pattern or a TIFF; None where the path is none of these."""
     if path.is_dir():
-        return ImageFiles(list_files(path))
+        return ImageFiles(list_images(path))
     if path.is_file():
         return Pages(path) if path.suffix.lower() in (".tif", ".tiff") else None
     if re.search(r"[*?\[]|%(0\d{1,3})?d", path.name):

@@ -8,21 +8,22 @@ from pathlib import Path
 from .._core import OffsetEstimate, Pairs, oriented
 from ..depth import (
     DEPTH_SUFFIXES,
-    PNG_SCALE,
     Depth,
     DepthProvider,
+    DepthUnits,
     MeasuredDepth,
     NetworkOptions,
     PlaneDepth,
     WrappedDepth,
     open_depth,
 )
+from ..depth.measured import DISPARITY
 from ..depth.points import POINT_SUFFIXES
 from ..frames import Image, InputError, list_files
 from .bag import BagImages, one_clock
 from .depth_topic import TopicDepth, is_depth_topic
 from .pairing import match_depth_stream, match_depths
-from .sources import open_stream
+from .sources import open_stream, open_two
 from .stream import Stream
 
 
@@ -69,7 +70,7 @@ def open_pairs(
 ) -> Pairs:
     """Open and pair what REFERENCE and SOURCE name, see `Pairs`."""
     m = matching or Matching()
-    references, sources = open_stream(reference), open_stream(source)
+    references, sources = open_two(reference, source)
     one_clock(references, sources)
     if m.exif_orientation == "apply":
         references, sources = oriented(references), oriented(sources)
@@ -90,7 +91,7 @@ def open_matched_depth(
     references: Stream,
     used: list[int],
     spec: str,
-    scale: float = PNG_SCALE,
+    units: DepthUnits | None = None,
     plane: PlaneDepth | None = None,
     network: NetworkOptions | None = None,
     measured: MeasuredDepth | None = None,
@@ -98,7 +99,7 @@ def open_matched_depth(
     """Depth of the frames ``used`` of the references, see `open_depth`: of a folder the files that
     `match_depths` finds, of a bag's topic the frames that `match_depth_stream` does.
     """
-    folder = Path(spec)
+    folder = Path(spec.removeprefix(DISPARITY))
     if is_depth_topic(spec):
         stream = open_stream(spec)
         if isinstance(references, BagImages) and isinstance(stream, BagImages):
@@ -110,9 +111,9 @@ def open_matched_depth(
             stream.use_clock(references.clock)
         matched = match_depth_stream(references, used, stream)
         measured = measured or MeasuredDepth()
-        provider = measured.open(spec, []) or TopicDepth(stream)
+        provider = measured.open(spec, []) or TopicDepth(stream, units)
         return PickedDepth(measured.conditioned(provider), matched)
-    given = scale, plane, network, measured
+    given = units, plane, network, measured
     if spec == "plane" or not folder.is_dir():
         paths = [Path(f"{references.name(index)}.png") for index in range(len(references))]
         provider = open_depth(spec, getattr(references, "paths", paths), *given)

@@ -8,7 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from .._core import video_line
 from ..frames import DecodeError, Image, InputError, quiet_opencv
+from ..progress import Lines
 from .stream import Stream
 
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv")
@@ -38,14 +40,13 @@ class Video(Stream):
         format_code = int(self._capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT)) & 0xFFFFFFFF
         self._gray = format_code.to_bytes(4, "little") in _GRAY_FORMATS
         announced = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        times = []
+        times: list[float] = []
+        lines = Lines()
         while self._capture.grab():
             times.append(self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
-        # Containers estimate their length to a frame or so; a file cut short lacks more.
-        if len(times) < 0.99 * announced - 1 or not times:
-            raise InputError(
-                f"{path}: cannot decode frame {len(times)} of about {announced}, truncated"
-            )
+            lines.say(f"counting the frames of {path}", f"{len(times)} of about {announced}")
+        rate = self._capture.get(cv2.CAP_PROP_FPS)
+        self.said = video_line(str(path), times, announced, rate)
         self.frame_times = np.array(times)
         rising = bool((np.diff(self.frame_times) > 0).all())
         self.times = self.frame_times if rising else None

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,9 @@ struct Evaluation {
     double valid_share = 0.0;   // mean share of the pixels judged
     Scores registered, unregistered;
     std::vector<std::pair<Scores, Scores>> frames;  // registered and unregistered
+    // Of images that another method registered, over the same pixels, where they were given.
+    std::optional<Scores> given;
+    std::vector<Scores> given_frames;
 
     // Change of a score by registration [%], NaN where undefined.
     double gain(std::size_t score) const;
@@ -43,7 +47,10 @@ class Evaluator {
     ~Evaluator();
 
     // Frames of one size, of the aspects of the rig's. depth: float32 [m], 0 unknown.
-    void add(const ImageView& reference, const ImageView& source, const ImageView& depth);
+    // given: the source as another method registers it, of any size of the reference's aspect; of
+    // every frame or of none.
+    void add(const ImageView& reference, const ImageView& source, const ImageView& depth,
+             const ImageView* given = nullptr);
 
     Evaluation result() const;  // throws std::invalid_argument without a frame
 

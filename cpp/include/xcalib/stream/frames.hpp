@@ -27,6 +27,8 @@ class Depth {
     virtual bool steadied() const { return false; }
     // Does it depend on the reference's pixels, or on its size alone?
     virtual bool looks_at_reference() const { return true; }
+    // For the user: what its numbers are taken for, in a line, or nothing.
+    virtual std::string line() const { return ""; }
 };
 
 using DepthPointer = std::shared_ptr<Depth>;

@@ -46,7 +46,7 @@ class Pairs {
     const StreamPointer& all_sources() const { return all_sources_; }
     const FrameList& reference_list() const { return reference_list_; }  // of all of them
     const Pairing& pairing() const { return pairing_; }
-    const std::vector<std::string>& notes() const { return notes_; }  // for the user, a line each
+    std::vector<std::string> notes() const;  // for the user, a line each
 
     // That they are paired with.
     TimeOffset offset() const {

@@ -34,6 +34,8 @@ class Stream {
     virtual bool concurrent() const { return false; }  // may several threads read, in any order?
     // [s] of the frames on the clock of this stream, never falling; none where unknown.
     std::optional<std::vector<double>> times;
+    // For the user: what of it was not used, or is missing, in a line, or nothing.
+    std::string said;
 
     // Frame `index`, 0 <= index < size(); throws InputError where it is not of the size of the
     // others, DecodeError where it cannot be decoded.
@@ -90,6 +92,7 @@ class Converted : public Stream {
     Converted(StreamPointer stream, Convert convert)
         : stream_(std::move(stream)), convert_(std::move(convert)) {
         times = stream_->times;
+        said = stream_->said;
     }
     int size() const override { return stream_->size(); }
     std::string name(int index) const override { return stream_->name(index); }
@@ -123,6 +126,11 @@ class Half : public Converted {
 
 // Times of a stream from a table of `name timestamp` lines, see times_of_table().
 std::vector<double> read_times(const std::filesystem::path& table, const Stream& stream);
+
+// Those of timestamps.csv or timestamps.txt beside the files of a stream, where there is one. A
+// table without names that has more or fewer lines is another's: `said` says that it is not used.
+std::optional<std::vector<double>> times_beside(const std::vector<std::filesystem::path>& files,
+                                                const Stream& stream, std::string& said);
 
 // The stream with false colour turned back to numbers, by `colormap` (auto, none, or a name), and a
 // line that says so in `said`. auto reads a few frames.

@@ -12,4 +12,9 @@ namespace XCALIB_EXPORT xcalib {
 // read from the data.
 std::string tiff_pixel_type(std::string_view data);
 
+// Makes the page of full size the first of a TIFF file, as of one that begins with a thumbnail;
+// other files stay as they are. Throws InputError, naming `name`, where several pages are of that
+// size.
+void put_full_page_first(std::string& data, const std::string& name);
+
 }  // namespace xcalib

@@ -1,0 +1,150 @@
+"""Every printed command and snippet of README and docs runs, on a small rendered rig."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import xcalib
+from bags import write_bag
+from conftest import ROOT, run
+from xcalib.depth import read_depth
+from xcalib.frames import list_files, read_image
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+NOT_HERE = {
+    "make ": "what a fresh machine does: .ci runs it",
+    "pip install": "the same",
+    "cmake ": "the same",
+    "python bench": "tests/test_bench.py and test_experiments.py run them",
+    "xcalib models fetch": "needs the network",
+    ".onnx": "needs a network's file: tests/test_networks.py and test_flow.py",
+    "--live": "needs cameras",
+    "xcalib-cli": "tests/test_xcalib_cli.py runs both commands on the same arguments",
+    "export ": "an environment",
+}
+"""What of a line keeps it from being run here, and why."""
+
+
+def blocks(page: Path) -> Iterator[tuple[str, str]]:
+    """Language and text of the fenced blocks; indented ones are ``sh`` or output."""
+    text = page.read_text(encoding="utf-8")
+    for found in re.finditer(r"^```(\w*)\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        yield found[1], found[2]
+    plain = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    for found in re.finditer(r"(?:^    \S.*\n|^        .*\n)+", plain, re.MULTILINE):
+        yield "", re.sub("^    ", "", found[0], flags=re.MULTILINE)
+
+
+def commands() -> Iterator[Any]:
+    for page in PAGES:
+        for language, text in blocks(page):
+            if language not in ("sh", "bash", ""):
+                continue
+            for line in text.replace("\\\n", " ").splitlines():
+                if re.match(r"xcalib(-cli)? \w|make |pip |cmake |python ", line):
+                    yield pytest.param(line, id=f"{page.stem}: {line[:50]}")
+
+
+def snippets() -> Iterator[Any]:
+    for page in PAGES:
+        for number, (language, text) in enumerate(blocks(page)):
+            if language == "python":
+                yield pytest.param(text, id=f"{page.stem} {number}")
+
+
+@pytest.fixture(scope="module")
+def folder(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the pages' commands find: footage of one small rig under all their names."""
+    folder = tmp_path_factory.mktemp("docs")
+    for name in ("visible", "thermal", "depth", "rig.yaml"):
+        (folder / name).symlink_to(rendered / name)
+    visible, thermal = (
+        [read_image(path) for path in list_files(folder / name)] for name in ("visible", "thermal")
+    )
+    width, height = 160, 120
+    size = (2 * width, height)
+    writer = cv2.VideoWriter(str(folder / "drive.mp4"), cv2.VideoWriter.fourcc(*"mp4v"), 10, size)
+    for left, right in zip(visible, thermal, strict=True):
+        halves = [cv2.resize(image, (width, height)) for image in (left, right)]
+        halves[1] = cv2.cvtColor(halves[1], cv2.COLOR_GRAY2BGR)
+        writer.write(np.hstack(halves))
+    writer.release()
+    topics = {"/visible/image_raw": ("bgr8", visible), "/thermal/image_raw": ("mono8", thermal)}
+    bag = write_bag(folder / "bag", "mcap", topics)
+    (folder / "drive.mcap").symlink_to(bag)
+    return folder
+
+
+@pytest.mark.parametrize("line", commands())
+def test_printed_commands_run(
+    line: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if any(part in line for part in NOT_HERE):
+        return
+    for path in folder.iterdir():
+        (tmp_path / path.name).symlink_to(path)
+    monkeypatch.chdir(tmp_path)
+    words = shlex.split(re.sub(r"\s#\s.*", "", line))[1:]
+    # They open, pair and choose all that they name; README's own are run to their end.
+    dry = words[0] in ("calibrate", "register", "evaluate") and line not in README_COMMANDS
+    result = run(*words, *(["--dry-run"] if dry else []))
+    assert result.exit_code in (0, 3), result.stderr
+
+
+README_COMMANDS = [
+    line
+    for _, text in blocks(ROOT / "README.md")
+    for line in text.splitlines()
+    if re.match("xcalib (register|evaluate|inspect)", line)
+]
+
+
+def test_what_is_not_run_here_is_still_printed() -> None:
+    printed = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    assert [part for part in NOT_HERE if part not in printed and part != "export "] == []
+    assert len(README_COMMANDS) == 3
+
+
+@pytest.mark.parametrize("text", snippets())
+def test_printed_snippets_run(
+    text: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if ".onnx" in text and "PatchFlow" not in text:
+        return  # tests/test_networks.py
+    (tmp_path / "drive.mp4").symlink_to(folder / "drive.mp4")
+    monkeypatch.chdir(tmp_path)
+    visible, thermal = (
+        [read_image(path) for path in list_files(folder / name)] for name in ("visible", "thermal")
+    )
+    depths = [read_depth(path) for path in list_files(folder / "depth")]
+    rig = xcalib.Rig.load(folder / "rig.yaml")
+    warped, mask = xcalib.Registrar(rig).register(thermal[0], depths[0])
+    from xcalib.footage import open_stream
+
+    names: dict[str, Any] = {
+        "np": np,
+        "xcalib": xcalib,
+        "open_stream": open_stream,
+        "visible": visible[:3],
+        "thermal": thermal[:3],
+        "depths": depths,
+        "visible_images": visible[:3],
+        "thermal_images": thermal[:3],
+        "depth_maps": depths[:3],
+        "thermal_image": thermal[0],
+        "depth_map": depths[0],
+        "reference": visible[0],
+        "warped": warped,
+        "mask": mask,
+        "relative": [np.where(depth > 0, 1 / np.maximum(depth, 1), 0) for depth in depths[:3]],
+    }
+    exec(compile(text, "snippet", "exec"), names)
