@@ -1,9 +1,13 @@
 #include "xcalib/calibration_options.hpp"
 
 #include <cmath>
+#include <locale>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
 
+#include "xcalib/error.hpp"
+#include "xcalib/parameters.hpp"
 #include "xcalib/threads.hpp"
 
 namespace xcalib {
@@ -17,6 +21,22 @@ void require(bool ok, const char* field, double value, const char* expected) {
 }
 
 }  // namespace
+
+Tolerance Tolerance::parse(const std::string& option, const std::string& text) {
+    constexpr double kWider = 2.5;
+    std::vector<double> values;
+    std::istringstream parts(text + ",");
+    parts.imbue(std::locale::classic());
+    double value = 0;
+    char comma = 0;
+    while (parts >> value >> comma && comma == ',' && value > 0) values.push_back(value);
+    parts.clear();
+    const bool whole = parts.peek() == std::istringstream::traits_type::eof();
+    if (!whole || values.empty() || values.size() > 2)
+        throw InputError(option + " is '" + text +
+                         "', expected MEDIAN or MEDIAN,P95: pixels above 0, as 2,5");
+    return {values[0], values.size() > 1 ? values[1] : kWider * values[0]};
+}
 
 void CalibrationOptions::validate() const {
     require(max_frames >= 1, "max_frames", max_frames, "at least 1");
@@ -36,6 +56,13 @@ void CalibrationOptions::validate() const {
     if (source_camera) source_camera->validate("options: source_camera");
     if (reference_lens) reference_lens->validate("options: reference_lens");
     if (source_lens) source_lens->validate("options: source_lens");
+    if (optimize_lens && source_camera)
+        throw std::invalid_argument(
+            "options: optimize_lens beside source_camera, which is kept, expected one of them");
+    if (optimize_lens && source_lens && !has_lens_parameters(*source_lens))
+        throw std::invalid_argument(
+            "options: optimize_lens with source_lens = " + Lens::word(source_lens) +
+            ", expected brown of 4 or 5 coefficients, or none given");
     require(search.max_fov_ratio > 1 && search.max_fov_ratio <= 10, "search.max_fov_ratio",
             search.max_fov_ratio, "a ratio in (1, 10]");
     require(search.max_roll_deg >= 0 && search.max_roll_deg <= 180, "search.max_roll_deg",
@@ -44,6 +71,8 @@ void CalibrationOptions::validate() const {
             search.min_overlap, "a share in (0, 1)");
     require(search.map_width >= 32, "search.map_width", search.map_width, "at least 32 px");
     require(search.candidates >= 1, "search.candidates", search.candidates, "at least 1");
+    require(tolerance.median > 0, "tolerance.median", tolerance.median, "more than 0 px");
+    require(tolerance.p95 > 0, "tolerance.p95", tolerance.p95, "more than 0 px");
     if (relative_depth) relative_depth->validate("options: relative_depth");
     if (solver != Solver::adam) return;
     if (search.mode == SearchMode::full || search.mode == SearchMode::local)

@@ -68,18 +68,14 @@ LagReport fit_lags(const FittedFrames& frames, Stream& all_sources, const Rig& r
 
 void add_lags(const LagReport& lag, const TimeOffset& offset, const Stream& all_sources,
               CalibrationResult& result) {
-    CalibrationReport& report = result.report;
-    report.lag = lag;
+    result.report.lag = lag;
     if (lag.frames == 0 && lag.change == 0) return;
-    std::string late = lag.line() + ": ";
-    if (lag.change != 0)
-        late +=
-            "it lost frames, or a pause was not counted; give times of both (--source-times), or a "
-            "part of the footage";
-    else
-        late += "try " + option_for_lag(offset, lag.frames, clock_of(all_sources.frames()).value());
-    report.message = report.converged ? late : report.message + "; " + late;
-    report.converged = result.converged = false;
+    result.distrust(
+        lag.line(),
+        lag.change != 0
+            ? "it lost frames, or a pause was not counted; give times of both (--source-times), or "
+              "a part of the footage"
+            : "try " + option_for_lag(offset, lag.frames, clock_of(all_sources.frames()).value()));
 }
 
 }  // namespace xcalib

@@ -52,8 +52,10 @@ colormap_option = click.option(
 
 
 def load_rig(path: Path) -> Rig:
-    """The rig of a file, with a warning of what is not plausible in it."""
-    rig = Rig.load(path)
+    """The rig of a file, ours or another tool's, with a warning of what is not plausible in it."""
+    from ..convert import is_foreign, read_rig  # seldom needed, and it loads much
+
+    rig = read_rig(path) if is_foreign(path) else Rig.load(path)
     for line in _core.implausible(rig):
         warn(f"{path}: {line}")
     return rig

@@ -23,7 +23,7 @@ from .arguments import (
     threads_option,
     with_scalar_sources,
 )
-from .errors import NOT_TRUSTED, stop
+from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Output
 
 
@@ -78,3 +78,4 @@ def command(
         write_bytes(json_file, evaluation_document(result, str(rig_file), names).encode())
     if not result.valid_share:
         stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")
+    require_trusted(rig, rig_file)

@@ -19,7 +19,7 @@ from .arguments import (
     rig_argument,
     threads_option,
 )
-from .errors import NOT_TRUSTED, stop
+from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Output
 
 
@@ -82,3 +82,4 @@ def command(
     click.echo(f"{total.summary()}: {output}")
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")
+    require_trusted(rig, rig_file)
