@@ -63,6 +63,18 @@ def test_the_page_is_whole_and_alone(made: Path, page: Path) -> None:
     assert document["run"]["arguments"][1] in text
 
 
+def test_the_error_over_the_image(made: Path) -> None:
+    document = json.loads((made / "report.json").read_text())
+    errors = document["expected_error_map"]
+    near, *_, far = errors["depths_m"]
+    assert (near, far) == pytest.approx((document["near_m"], document["far_m"]))
+    maps = np.array(errors["median_px"], float)
+    assert maps.shape == (6, errors["width"] * errors["height"])
+    assert np.isfinite(maps).mean() > 0.5 and np.nanmin(maps) >= 0
+    assert "expected_error_map" not in run("report", made).output
+    assert 'id="error-data"' in (made / "report.html").read_text()
+
+
 def test_calibrate_writes_the_page_too(rendered: Path, tmp_path: Path) -> None:
     inputs = (rendered / "visible", rendered / "thermal", "--depth", rendered / "depth")
     more = ("--initial", rendered / "rig.yaml", "-o", tmp_path / "rig.yaml")
@@ -244,6 +256,12 @@ def test_a_browser_shows_it(browser: Any, page: Path) -> None:
         shown[mode] = picture(stack)
         others = [image for name, image in shown.items() if name != mode]
         assert all((shown[mode] != image).any() for image in others), mode
+
+    cell = browser.find_elements(By.CSS_SELECTOR, "#error-map rect")[150]
+    depth, near = browser.find_element(By.ID, "depth"), cell.get_attribute("fill")
+    depth.send_keys(Keys.HOME)
+    assert cell.get_attribute("fill") != near
+    assert browser.find_element(By.ID, "depth-out").text.endswith(" m")
 
     rig = browser.find_element(By.ID, "rig")
     at_first = rig.find_element(By.TAG_NAME, "line").get_attribute("x2")

@@ -1,6 +1,9 @@
 #include "xcalib/judge/documents.hpp"
 
+#include <cmath>
+
 #include "judge/json.hpp"
+#include "xcalib/calibrate.hpp"
 #include "xcalib/judge/describe.hpp"
 
 namespace xcalib {
@@ -106,6 +109,24 @@ Json json_of(const LagReport& lag) {
                         {"skew_px", fit.rig.source.skew}});
     }
     return {{"frames", lag.frames}, {"change", lag.change}, {"fits", fits}};
+}
+
+// Maps over the reference image at depths from the near to the far end of the footage's, in equal
+// steps of inverse depth; null where no error is expected of any depth.
+Json error_maps(const CalibrationReport& report) {
+    constexpr int kDepths = 6, kWidth = 20, kHeight = 15;
+    if (!report.errors || report.verdict.by_depth.empty() || !(report.near_m > 0)) return nullptr;
+    Json depths = Json::array(), maps = Json::array();
+    for (int i = 0; i < kDepths; ++i) {
+        const double far = i / (kDepths - 1.0);
+        const double depth = 1 / ((1 - far) / report.near_m + far / report.far_m);
+        depths.push_back(depth);
+        Json map = Json::array();
+        for (const float error : expected_error_map(report, depth, kWidth, kHeight).pixels)
+            map.push_back(std::round(1000.0 * error) / 1000);
+        maps.push_back(map);
+    }
+    return {{"depths_m", depths}, {"width", kWidth}, {"height", kHeight}, {"median_px", maps}};
 }
 
 Json json_of(const RunFacts& run) {
@@ -218,6 +239,7 @@ std::string report_document(const CalibrationReport& report, const std::string& 
                   {"files", files},
                   {"run", json_of(run)}};
     document.update(json_of(report));
+    document["expected_error_map"] = error_maps(report);
     return text_of(document) + "\n";
 }
 

@@ -12,6 +12,9 @@ from ..frames import InputError, check_file_writable
 from ..report.run import load_document, of_report
 from .options import Input, Output
 
+PICTURE = "expected_error_map"
+"""Of a report: numbers that only a page can show."""
+
 
 @click.command("report", short_help="The report of a calibration, as text or as a page.")
 @click.argument("run", metavar="RUN", type=Input())
@@ -44,6 +47,8 @@ def command(run: Path, output: Path | None) -> None:
 def lines_of(document: dict[str, Any], indent: str = "") -> Iterator[str]:
     """A JSON object as text: values by name, lists of objects as tables."""
     for key, value in document.items():
+        if key == PICTURE:
+            continue
         if isinstance(value, dict):
             yield f"{indent}{key}:"
             yield from lines_of(value, indent + "  ")

@@ -32,7 +32,7 @@ from .arguments import (
     rig_argument,
     threads_option,
 )
-from .errors import NOT_TRUSTED, stop
+from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Input
 
 
@@ -94,6 +94,7 @@ def command(
     gone = sum(labelled.counts[what] for what in ("outside", "no depth", "ambiguous"))
     if labelled.counts["labels"] and gone == labelled.counts["labels"]:
         stop(NOT_TRUSTED, "no label has a sure place in the other images")
+    require_trusted(rig, rig_file)
 
 
 def of_file(labels: Path, labelled: LabelledFrames) -> str:

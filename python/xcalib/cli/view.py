@@ -22,7 +22,7 @@ from .arguments import (
     rig_argument,
     threads_option,
 )
-from .errors import warn
+from .errors import require_trusted, warn
 from .options import Input
 
 
@@ -69,3 +69,4 @@ def command(
     else:
         count = write_view(every, rate_of(frames), overlay, output)
     click.echo(f"{count} frames: {output}")
+    require_trusted(rig, rig_file)
