@@ -191,9 +191,9 @@ Picture parse_npy(const std::string& data, const std::string& name, ArrayKind ki
     const std::string& type = array->type;
     const bool is_float = type == "f2" || type == "f4" || type == "f8";
     if (!is_float && type != "u2" && !(is_image && type == "u1"))
-        throw InputError(name + (is_image ? ": pixels are " : ": depth is ") + type_name(type) +
-                         (is_image ? ", expected uint8, uint16 or floats"
-                                   : ", expected floats in metres"));
+        throw InputError(
+            name + (is_image ? ": pixels are " : ": depth is ") + type_name(type) +
+            (is_image ? ", expected uint8, uint16 or floats" : ", expected floats in metres"));
     const std::size_t bytes = static_cast<std::size_t>(type[1] - '0');
     const std::size_t height = sides[0], width = sides[1], count = sides[2];
     // Both sides fit 31 bits: their product is exact.

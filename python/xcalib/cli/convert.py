@@ -8,7 +8,7 @@ import click
 
 from .. import _core
 from ..convert import FORMATS, TOLERANCE, read_rig, write_rig
-from ..convert.maps import MAPS, PNG_SCALE, write_maps
+from ..convert.maps import MAPS, write_maps
 from ..frames import InputError
 from .errors import warn
 from .options import Input, number
@@ -71,7 +71,12 @@ def size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple
     metavar="M|FILE|FOLDER",
     help="Of a map: metres, the same everywhere, a depth map, or a folder of them.",
 )
-@number("--depth-scale", "M", PNG_SCALE, "Metres per count of 16-bit PNG depth.", "1/256")
+@click.option(
+    "--depth-scale",
+    metavar="M",
+    type=float,
+    help="Metres per unit of the numbers in depth maps.  [default: 1/256 of PNG, else 1]",
+)
 def command(
     files: tuple[Path, ...],
     output: Path,
@@ -81,7 +86,7 @@ def command(
     source_size: tuple[int, int] | None,
     tolerance: float,
     depth: str | None,
-    depth_scale: float,
+    depth_scale: float | None,
 ) -> None:
     """Write a rig as another tool has it, or read another tool's.
 
@@ -100,7 +105,7 @@ def command(
         warn(f"{files[0]}: {line}")
     refuse_input(output, [*files, *([Path(depth)] if depth else [])])
     if depth is not None:
-        lines = write_maps(rig, depth, depth_scale, output, to)
+        lines = write_maps(rig, depth, _core.DepthUnits(scale=depth_scale), output, to)
     else:
         lines = write_rig(rig, output, to, tolerance)
     for line in lines:

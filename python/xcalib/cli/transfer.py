@@ -22,7 +22,7 @@ from ..labels.coco import transfer_coco
 from ..labels.frames import LabelledFrames
 from ..labels.points import transfer_points
 from ..labels.yolo import transfer_yolo
-from ..pipeline import progress
+from ..progress import progress
 from .arguments import (
     check_writes,
     frames_arguments,

@@ -9,7 +9,7 @@ import click
 
 from ..frames import check_file_writable, check_folder_writable
 from ..overlays import KINDS
-from ..pipeline import progress
+from ..progress import progress
 from ..recording import write_recording
 from ..rerun_log import write_rerun
 from ..view import rate_of, registered, write_view

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import InputError, Registrar, Rig
-from ..depth import DEPTH_SUFFIXES, PNG_SCALE, read_depth
+from .._core import DepthUnits, InputError, Registrar, Rig
+from ..depth import DEPTH_SUFFIXES, read_depth
 from ..frames import (
     check_file_writable,
     check_folder_writable,
@@ -75,7 +75,7 @@ MAPS: dict[str, tuple[str, Callable[[Map], tuple[bytes, str]]]] = {
 """By the name that ``--to`` takes: the suffix, and what makes the file."""
 
 
-def write_maps(rig: Rig, depth: str, scale: float, output: Path, kind: str) -> list[str]:
+def write_maps(rig: Rig, depth: str, units: DepthUnits, output: Path, kind: str) -> list[str]:
     """Write the map for a depth in metres, the same everywhere, or for the depth map of a file; of
     a folder of depth maps a folder of maps, under their names. Returns what is left out.
     """
@@ -97,7 +97,7 @@ def write_maps(rig: Rig, depth: str, scale: float, output: Path, kind: str) -> l
         check_file_writable(str(path))
         if path.suffix.lower() != suffix:
             raise InputError(f"{path}: expected a name that ends in {suffix} for {kind}")
-        data, line = encode(registrar.map(read_depth(file, scale) if values is None else values))
+        data, line = encode(registrar.map(read_depth(file, units) if values is None else values))
         if line:
             lines.append(f"{path}: {line}")
         write_bytes(path, data)
@@ -115,4 +115,4 @@ def number(depth: str) -> float | None:
     return metres
 
 
-__all__ = ["MAPS", "PNG_SCALE", "write_maps"]
+__all__ = ["MAPS", "write_maps"]
