@@ -134,9 +134,19 @@ def constant(depths: list[Image]) -> list[Image]:
     return [np.full_like(depth, 10) for depth in depths]
 
 
+def mirrored(depths: list[Image]) -> list[Image]:
+    return [np.ascontiguousarray(depth[:, ::-1]) for depth in depths]
+
+
+def of_one_frame(depths: list[Image]) -> list[Image]:
+    return [depths[0]] * len(depths)
+
+
 @pytest.mark.parametrize(
     ("spoil", "reason", "advice"),
     [
+        (mirrored, "the depth maps fit better when they are mirrored", "as the reference images"),
+        (of_one_frame, "all frames have the same depth map", "each frame its own"),
         (of_the_next_frame, "the depth of the last frame fits better", "late or early"),
         (inverse, "inverse depth fits better than the given depth", "disparity"),
         (constant, "every depth is the same", "give the depth of each pixel"),
@@ -154,6 +164,15 @@ def test_depth_that_is_wrong_is_named(
     assert not verdict.trusted
     assert reason in verdict.reason
     assert advice in verdict.advice
+
+
+def test_the_same_footage_twice_is_named(rendered: Path) -> None:
+    references = [read_image(path) for path in list_files(rendered / "visible")]
+    depths = [read_depth(path) for path in list_files(rendered / "depth")]
+    verdict = xcalib.calibrate(references, references, depths).report.verdict
+    assert not verdict.trusted
+    assert "edges of both images have the same sign" in verdict.reason
+    assert "MSX" in verdict.advice
 
 
 @pytest.mark.parametrize("word", ["x", "1,2,3", "-1", "0", "1,", "2,nan", "1 2"])

@@ -149,6 +149,8 @@ TEST(DepthCheck, NamesWhatIsWrong) {
         {[](DepthCheck& check) { check.relief = 0; }, "every depth is the same"},
         {[](DepthCheck& check) { check.one_for_all = true; }, "all frames have the same depth"},
         {[](DepthCheck& check) { check.inverse = 0.6; }, "inverse depth fits better"},
+        {[](DepthCheck& check) { check.mirrored = 0.6; }, "when they are mirrored"},
+        {[](DepthCheck& check) { check.upside_down = 0.6; }, "when they are turned upside down"},
         {[](DepthCheck& check) { check.none = 0.6; }, "no depth at all fits better"},
         {[](DepthCheck& check) { check.exchanged = 0.5; }, "fits as well as each frame's own"},
         {[](DepthCheck& check) { check.beside = 0.6; }, "the depth of the last frame fits better"},

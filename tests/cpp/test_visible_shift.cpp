@@ -51,7 +51,6 @@ TEST(Verdict, AFitThatFlowSeesToBeOffIsNotTrusted) {
     const auto halves = [](const Rig& rig) {
         Halves same;
         same.rigs = {rig, rig};
-        same.independent = true;
         return same;
     };
     judge(scene.images, finest(scene), scene.truth, halves(scene.truth), plan, report);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "base/format.hpp"
@@ -160,10 +161,22 @@ DepthCheck check_depth(const WorkingImages& images, const Rig& rig, const Plan& 
     out.refitted = given.fine;
     // What coarse edges agree with clearly less, fine ones do too.
     const double hopeless = 0.95 * given.coarse;
-    const auto instead = [&](const auto& change) {
-        return refitted(with_each_depth(few, change), rig, plan, hopeless).fine;
+    const auto fits = [&](const WorkingImages& changed) {
+        return refitted(changed, rig, plan, hopeless).fine;
     };
+    const auto instead = [&](const auto& change) { return fits(with_each_depth(few, change)); };
     out.none = instead([&](float) { return 1 / middle; });
+    out.mirrored = fits(with_depths(few, [](std::vector<Image>& depths) {
+        for (Image& depth : depths)
+            for (int y = 0; y < depth.height; ++y)
+                std::reverse(depth.row(y), depth.row(y) + depth.width);
+    }));
+    out.upside_down = fits(with_depths(few, [](std::vector<Image>& depths) {
+        for (Image& depth : depths)
+            for (int y = 0; y < depth.height / 2; ++y)
+                std::swap_ranges(depth.row(y), depth.row(y) + depth.width,
+                                 depth.row(depth.height - 1 - y));
+    }));
     // Relative depth is an inverse depth of unknown shift: its inverse says nothing.
     if (!plan.options.relative_depth)
         out.inverse = instead([&](float z) { return 1 / (middle * middle * z); });
@@ -185,18 +198,25 @@ std::optional<Objection> wrong_depth(const DepthCheck& check) {
             format("inverse depth fits better than the given depth: edges agree by %.3f, not %.3f",
                    check.inverse, check.refitted),
             "are the depth files disparity? Convert them to metres"};
-    if (check.none > (1 + kGain) * check.refitted)
-        return Objection{
-            format(
-                "no depth at all fits better than the given depth: edges agree by %.3f, not %.3f",
-                check.none, check.refitted),
-            "is it registered to the reference images, and in their order?"};
     if (check.exchangeable && check.beside - 2 * check.beside_error > (1 + kGain) * check.own)
         return Objection{
             format("the depth of the %s frame fits better than each frame's own: edges agree by "
                    "%.3f, not %.3f",
                    check.beside_is_next ? "next" : "last", check.beside, check.own),
             "is the depth late or early, or one file short?"};
+    for (const auto& [turned, how] : {std::pair(check.mirrored, "mirrored"),
+                                      std::pair(check.upside_down, "turned upside down")})
+        if (turned > (1 + kGain) * check.refitted)
+            return Objection{
+                format("the depth maps fit better when they are %s: edges agree by %.3f, not %.3f",
+                       how, turned, check.refitted),
+                "turn the depth maps as the reference images are"};
+    if (check.none > (1 + kGain) * check.refitted)
+        return Objection{
+            format(
+                "no depth at all fits better than the given depth: edges agree by %.3f, not %.3f",
+                check.none, check.refitted),
+            "is it registered to the reference images, and in their order?"};
     if (check.exchangeable && check.parallax_px > kParallax &&
         check.own - check.exchanged + check.exchange_error < kGain * check.own)
         return Objection{

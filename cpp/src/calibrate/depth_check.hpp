@@ -21,9 +21,10 @@ struct DepthCheck {
         0.0;  // standard error of their difference, from its scatter over frames
     double beside = 0.0, beside_error = 0.0;  // the better of the two neighbours' depth
     bool beside_is_next = false;
-    // The same on some frames, each after a short fit: with one depth everywhere, and with inverse
-    // depth in place of depth; 0 where coarse edges show already that it is less.
-    double refitted = 0.0, none = 0.0, inverse = 0.0;
+    // The same on some frames, each after a short fit: with one depth everywhere, with inverse
+    // depth in place of depth, and with depth maps mirrored or upside down; 0 where coarse edges
+    // show already that it is less.
+    double refitted = 0.0, none = 0.0, inverse = 0.0, mirrored = 0.0, upside_down = 0.0;
     double parallax_px = 0.0;  // what the depths from 5 to 95 % move [px at 640 px of width]
     double relief = 0.0;       // the range from 5 to 95 % of inverse depths, over their median
 };

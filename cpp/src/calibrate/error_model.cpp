@@ -20,10 +20,10 @@ constexpr double kUnitWidth = 640;  // [px] of the reference, in whose pixels er
 
 // A frame tells of some directions only: so much of what all say goes to every direction alike.
 constexpr double kShrinkage = 0.3;
-// Measured on rigs whose truth is known (docs/trust.md), as are those below: shares of the squared
-// error that the gradients' scatter predicts, that halves which lie apart show, and that the lens
-// which was not estimated would make,
-constexpr double kPredicted = 1.0, kApart = 0.2, kMissed = 0.5;
+// Measured on rigs whose truth is known (docs/trust.md), as are those below: weights of the
+// squared errors that the gradients' scatter predicts, that halves which lie apart show, and that
+// the lens would make which was not estimated,
+constexpr double kPredicted = 0.6, kApart = 0.12, kMissed = 1.5;
 // what all frames share and none of these sees [working px],
 constexpr double kFloor = 0.02;
 // and the degrees of freedom of the error's distribution, of which the tails are heavier than a

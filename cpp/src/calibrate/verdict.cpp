@@ -12,6 +12,7 @@
 #include "calibrate/depth_check.hpp"
 #include "calibrate/error_model.hpp"
 #include "calibrate/plausible.hpp"
+#include "calibrate/shared_detail.hpp"
 #include "calibrate/visible_shift.hpp"
 #include "solve/solve.hpp"
 
@@ -47,20 +48,14 @@ Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
     return out;
 }
 
-std::string today() {
-    const std::time_t now = std::time(nullptr);
-    std::tm parts{};
-    gmtime_r(&now, &parts);
-    char text[16];
-    std::strftime(text, sizeof text, "%Y-%m-%d", &parts);
-    return text;
-}
-
 // Why a rig is not to be trusted, and what to do about it; none where it is.
 std::optional<Objection> objection(const CalibrationReport& report, const WorkingImages& images,
                                    const Rig& rig, const Halves& halves, const Plan& plan,
                                    const ErrorModel& model) {
-    constexpr double kContrast = 5.0, kShift = 3.0, kShare = 0.05;
+    constexpr double kContrast = 5.0, kShare = 0.05, kSameSign = 0.6;
+    // Where two searches agree, flow would have to see much to know better: of few frames it is
+    // itself wrong by that much.
+    const double most_shift = halves.independent ? 6.0 : 3.0;
     constexpr std::size_t kFewFrames = 8;
     const Verdict& verdict = report.verdict;
     const bool stands_out = report.contrast >= kContrast;
@@ -96,12 +91,19 @@ std::optional<Objection> objection(const CalibrationReport& report, const Workin
             "do the frames belong together (same moment, same order, not exchanged), "
             "and do both images show edges?"};
     }
+    if (const double same = same_sign(images, rig, plan.options.num_threads); same > kSameSign)
+        return Objection{
+            format("edges of both images have the same sign (%.2f, 1 for an image and itself): the "
+                   "source shows what the reference does",
+                   same),
+            "is it the same footage twice, or are visible edges drawn into it (MSX)? Give thermal "
+            "images as they come from the sensor"};
     if (auto wrong = wrong_depth(check_depth(images, rig, plan))) return wrong;
     if (auto implausible = implausible_in(rig, report.near_m, plan, model)) return implausible;
-    if (report.visible_shift_px > kShift)
+    if (report.visible_shift_px > most_shift)
         return Objection{format("flow between the registered images still sees a shift of %.1f px, "
                                 "expected at most %.0f",
-                                report.visible_shift_px, kShift),
+                                report.visible_shift_px, most_shift),
                          "does a lens bend the images, or is the depth of other frames?"};
     const Tolerance& tolerance = plan.options.tolerance;
     const ExpectedError& expected = verdict.expected_error;
@@ -118,6 +120,17 @@ std::optional<Objection> objection(const CalibrationReport& report, const Workin
 }
 
 }  // namespace
+
+std::string today() {
+    const std::time_t now = std::time(nullptr);
+    std::tm parts{};
+    gmtime_r(&now, &parts);
+    char text[16];
+    std::strftime(text, sizeof text, "%Y-%m-%d", &parts);
+    return text;
+}
+
+std::string this_software() { return "xcalib " XCALIB_VERSION; }
 
 void judge(const WorkingImages& images, const Level& finest, const Rig& rig, const Halves& halves,
            const Plan& plan, CalibrationReport& report) {
@@ -146,7 +159,7 @@ void judge(const WorkingImages& images, const Level& finest, const Rig& rig, con
     Verdict& verdict = report.verdict;
     verdict.frames = static_cast<int>(images.size());
     verdict.date = today();
-    verdict.software = "xcalib " XCALIB_VERSION;
+    verdict.software = this_software();
     verdict.found = agree(halves, images) && (halves.independent || report.contrast >= 5.0);
     report.errors = std::make_shared<const ErrorModel>(images, finest, rig, halves, plan);
     const ErrorModel& model = *report.errors;

@@ -1,6 +1,8 @@
 // Is a calibration to be trusted? Judged from the footage alone.
 #pragma once
 
+#include <string>
+
 #include "calibrate/halves.hpp"
 #include "solve/working_images.hpp"
 #include "xcalib/calibration_report.hpp"
@@ -11,5 +13,8 @@ namespace xcalib {
 // baseline_nec, contrast, repeatability_px and visible_shift_px of the report.
 void judge(const WorkingImages& images, const Level& finest, const Rig& rig, const Halves& halves,
            const Plan& plan, CalibrationReport& report);
+
+std::string today();          // YYYY-MM-DD, UTC
+std::string this_software();  // and its version
 
 }  // namespace xcalib
