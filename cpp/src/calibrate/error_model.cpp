@@ -96,8 +96,10 @@ struct Estimate {
 };
 
 // (H + sP)^-1 (S + s^2 P) (H + sP)^-1, with S the covariance of the gradient, P what is known of
-// lenses, and s what makes S of H: how the fit would scatter if the frames were drawn again.
-Estimate estimate_of(const Evidence& evidence, const Eigen::VectorXd& prior) {
+// lenses and cameras, and s what makes S of H: how the fit would scatter if the frames were drawn
+// again.
+Estimate estimate_of(const Evidence& evidence, const Directions& directions) {
+    const Eigen::VectorXd& prior = directions.prior;
     const Eigen::Index size = evidence.hessian.rows();
     if (size == 0 || evidence.gradients.size() < 2)
         return {Eigen::VectorXd::Zero(size), Eigen::MatrixXd::Zero(size, size)};
@@ -111,7 +113,7 @@ Estimate estimate_of(const Evidence& evidence, const Eigen::VectorXd& prior) {
     scatter *= 1 - kShrinkage;
     scatter.diagonal().array() += kShrinkage * mean_scatter;
     scatter += noise * noise * whitening.transpose() * prior.asDiagonal() * whitening;
-    const Eigen::VectorXd held = (prior.array() > 0).select(evidence.sum(), 0.0);
+    const Eigen::VectorXd held = directions.held.cwiseProduct(evidence.sum());
     return {-whitening * (whitening.transpose() * held),
             whitening * scatter * whitening.transpose()};
 }
@@ -134,15 +136,19 @@ Directions directions_of(const Rig& rig, const Plan& plan) {
         if (!with_last) prior.push_back(moving.gauge ? 1 / (deviation * deviation) : 0);
         entries.emplace_back(i, static_cast<int>(prior.size()) - 1);
     }
+    int lenses = 0;
     if (plan.estimates_lens && has_lens_parameters(rig.source.lens))
         for (int k = moving.lens_coefficients; k < 2; ++k) {
             entries.emplace_back(out.parameters.size(), static_cast<int>(prior.size()));
             out.parameters.add(kSourceK1 + k);
             prior.push_back(1 / (kLens[k] * kLens[k]));
+            ++lenses;
         }
     out.basis = Eigen::MatrixXd::Zero(out.parameters.size(), static_cast<int>(prior.size()));
     for (const auto& [place, direction] : entries) out.basis(place, direction) = 1;
     out.prior = Eigen::Map<const Eigen::VectorXd>(prior.data(), static_cast<int>(prior.size()));
+    out.held = Eigen::VectorXd::Zero(out.prior.size());
+    out.held.tail(lenses).setOnes();
     return out;
 }
 
@@ -184,8 +190,8 @@ ErrorModel::ErrorModel(const WorkingImages& images, const Level& finest, const R
     const double count = static_cast<double>(images.size());
     disagreement_ = static_cast<double>(frames[0].size() * frames[1].size()) / (count * count);
     directions_ = directions_of(rig, plan);
-    const Estimate estimate = estimate_of(
-        evidence_of(finest, rig, directions_, plan.options.num_threads), directions_.prior);
+    const Estimate estimate =
+        estimate_of(evidence_of(finest, rig, directions_, plan.options.num_threads), directions_);
     step_ = estimate.step;
     covariance_ = estimate.covariance;
     motion_ = Eigen::MatrixXd::Zero(covariance_.rows(), covariance_.cols());

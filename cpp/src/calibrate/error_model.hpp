@@ -22,6 +22,7 @@ struct Directions {
     Parameters parameters = Parameters(0);
     Eigen::MatrixXd basis;  // parameters x directions: those that move together share one
     Eigen::VectorXd prior;  // what is known beforehand of each, inverse variances; mostly nothing
+    Eigen::VectorXd held;   // 1 for a lens that the fit did not move, else 0
 
     Eigen::Index of(int parameter) const;  // -1 where it is held
 };
