@@ -184,6 +184,14 @@ bench-cpp: | bench-packages
 	cmake -S . -B build/bench/cpp -G Ninja -DXCALIB_BENCH=ON -DXCALIB_WERROR=$(WERROR)
 	cmake --build build/bench/cpp --target xcalib_bench
 
+.PHONY: docs
+$(VENV)/.docs-requires: pyproject.toml $(VENV)/.build-requires
+	@echo "installing what the site requires"
+	@$(PIP) install -q -r <($(call requirements,project optional-dependencies docs))
+	touch $@
+docs: $(VENV)/.installed $(VENV)/.docs-requires ## the site of docs/, into build/docs
+	$(BIN)/sphinx-build -q -W --keep-going -E docs build/docs
+
 format: $(VENV)/.test-requires | test-packages ## rewrite the code in its style
 	clang-format -i $(CPP_FILES)
 	$(BIN)/ruff check --fix --exit-zero

@@ -48,7 +48,7 @@ PUBLISHED = (  # each has its table in docs/performance.md
 OTHERS = scripts("speed", "stream") | scripts(
     "accuracy",
     *("synthetic_rigs", "depth_sources", "depth_completion", "depth_conditioning", "patch_flow"),
-    *("flow_term", "frame_choice", "clock_offset", "lags"),
+    *("flow_term", "frame_choice", "clock_offset", "lags", "lenses", "trust"),
 )
 ALL = PUBLISHED | OTHERS
 

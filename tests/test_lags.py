@@ -67,7 +67,7 @@ def error(found: Path, folder: Path) -> float:
 
 NAMED = re.compile(
     r"not to be trusted: (.*; )?the source is 1 frame late \(NEC \+[0-9.]+ \+- [0-9.]+ over 1\d"
-    r" frames\): try --time-offset 1f, or auto"
+    r" frames\); try --time-offset 1f, or auto"
 )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import xcalib
 from xcalib.synthetic import Street, random_rig
 
-FRAMES = 8
+FRAMES = 6
 
 
 @pytest.fixture(scope="module")
@@ -21,10 +21,10 @@ def footage() -> tuple[xcalib.Rig, list[NDArray], list[NDArray], list[NDArray]]:
         hfov_deg=(45, 60),
         fov_ratio=(0.9, 1.1),
         max_baseline=0.2,
-        width=320,
-        height=240,
-        source_width=320,
-        source_height=256,
+        width=240,
+        height=180,
+        source_width=240,
+        source_height=192,
     )
     street = Street(rig, num_frames=FRAMES, seed=3)
     frames = [street.frame(i) for i in range(FRAMES)]

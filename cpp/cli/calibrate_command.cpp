@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -25,7 +26,7 @@ namespace {
 struct Arguments {
     FrameArguments frames;
     std::string output, choose = "informed", colormap = "auto", initial, search = "auto",
-                        mount = "auto", flow = "auto", solver = "ceres", report,
+                        mount = "auto", flow = "auto", solver = "ceres", tolerance = "2,5", report,
                         reference_lens = "auto", source_lens = "auto";
     std::optional<std::string> reference_intrinsics, source_intrinsics;
     bool explain = false, refine_plane = false;
@@ -56,7 +57,7 @@ Pinhole intrinsics(const std::string& flag, const std::string& text) {
 
 // The frames that say most about the rig.
 std::vector<int> choose_by_content(const Frames& frames, const Arguments& arguments,
-                                   Console& console) {
+                                   Console& console, RunFacts& run) {
     const std::vector<int> drawn =
         frames_to_look_at(frames.size(), arguments.options.max_frames, arguments.options.seed);
     // Depth counts where it is cheap.
@@ -82,12 +83,14 @@ std::vector<int> choose_by_content(const Frames& frames, const Arguments& argume
     const Choice choice = choose(std::move(candidates), arguments.options.max_frames);
     if (arguments.explain)
         console.line(choice.table([&](int index) { return frames.references->name(index); }));
-    for (const Candidate& c : choice.candidates)
+    for (const Candidate& c : choice.candidates) {
+        run.choice.push_back({frames.references->where(c.index), c.taken, c.reason});
         console.event("candidate", {{"frame", frames.references->where(c.index)},
                                     {"taken", c.taken},
                                     {"agreement", number(c.agreement)},
                                     {"gain", number(c.gain)},
                                     {"reason", c.reason}});
+    }
     const std::vector<Candidate> unusable = choice.unusable();
     if (!unusable.empty()) {
         const Candidate& first = unusable[0];
@@ -131,7 +134,8 @@ CalibrationResult calibrated(const Frames& frames, const LoadedFrames& loaded,
 // it is to be found (`--time-offset auto`): `frames`, `loaded` and `result` are then those of it.
 // Otherwise the result is not to be trusted.
 void look_at_lags(Frames& frames, LoadedFrames& loaded, const CalibrationOptions& options,
-                  const std::optional<Rig>& initial, Console& console, CalibrationResult& result) {
+                  const std::optional<Rig>& initial, Console& console, CalibrationResult& result,
+                  RunFacts& run) {
     constexpr int kLagRounds = 2;  // times at most that a lag is taken up
     for (int round = 0;; ++round) {
         FittedFrames fitted{loaded.views(&Frame::reference),
@@ -150,12 +154,17 @@ void look_at_lags(Frames& frames, LoadedFrames& loaded, const CalibrationOptions
         console.note("clock offset: " + lag.line() + ", taken up");
         std::vector<int> chosen = loaded.indices;
         frames = with_lag(frames, lag.frames, chosen);
+        run.lag += lag.frames;
         loaded = load(frames, chosen, console);
         result = calibrated(frames, loaded, options, initial, console);
     }
 }
 
 void check(const Arguments& a) {
+    if (Path(a.report).extension() == ".html")
+        throw InputError("--report " + a.report +
+                         ": pages are written by the Python command, `xcalib`; expected a file of "
+                         "another name, for JSON");
     if (a.reference_intrinsics && (a.options.reference_hfov_deg || a.options.optimize_reference))
         throw InputError(
             "--reference-intrinsics are kept; expected no --reference-hfov or --optimize-reference"
@@ -182,6 +191,7 @@ void run(Arguments a, bool has_report, Console& console) {
     CalibrationOptions& options = a.options;
     options.search.mode = value_of<SearchMode>("--search", a.search);
     options.mount = Mount::parse("--mount", a.mount);
+    options.tolerance = Tolerance::parse("--tolerance", a.tolerance);
     options.reference_lens = Lens::parse("--reference-lens", a.reference_lens);
     options.source_lens = Lens::parse("--source-lens", a.source_lens);
     options.flow = value_of("--flow", a.flow, flow_arguments());
@@ -201,8 +211,9 @@ void run(Arguments a, bool has_report, Console& console) {
     check_writes(writes, frames, {a.initial, a.frames.reference_times, a.frames.source_times});
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
 
+    RunFacts run{"xcalib-cli", console.arguments, std::filesystem::current_path().string(), 0, {}};
     const std::vector<int> chosen =
-        a.choose == "informed" ? choose_by_content(frames, a, console)
+        a.choose == "informed" ? choose_by_content(frames, a, console, run)
                                : draw_frames(frames.size(), options.max_frames, options.seed);
     if (a.frames.dry_run) return say_plan(frames, {a.output, a.report}, chosen, console);
     LoadedFrames loaded = load(frames, chosen, console);
@@ -232,6 +243,12 @@ void run(Arguments a, bool has_report, Console& console) {
             loaded.frames[i].depth = (*depth)(loaded.indices[i], loaded.frames[i].reference);
         frames.depth = depth;
         result = calibrated(frames, loaded, options, result.rig, console);
+        for (const auto& [option, value] :
+             {std::pair("--horizon", plane.horizon), std::pair("--plane-roll", plane.roll_deg)}) {
+            std::ostringstream number;
+            number << std::setprecision(17) << value;
+            run.arguments.insert(run.arguments.end(), {option, number.str()});
+        }
         std::ostringstream text;
         text << "plane: --horizon " << plane.horizon << " --plane-roll " << plane.roll_deg;
         console.line(text.str());
@@ -239,7 +256,7 @@ void run(Arguments a, bool has_report, Console& console) {
     }
     distrust(joined_line(loaded.views(&Frame::reference), "REFERENCE"), result);
     distrust(joined_line(loaded.views(&Frame::source), "SOURCE"), result);
-    look_at_lags(frames, loaded, options, initial, console, result);
+    look_at_lags(frames, loaded, options, initial, console, result, run);
     const Path output(a.output);
     if (output.has_parent_path()) std::filesystem::create_directories(output.parent_path());
     save_rig(result.rig, a.output);
@@ -247,7 +264,7 @@ void run(Arguments a, bool has_report, Console& console) {
     console.line("rig: " + a.output);
     std::vector<std::string> files;
     for (const int index : loaded.indices) files.push_back(frames.references->where(index));
-    const std::string document = report_document(result.report, a.output, files);
+    const std::string document = report_document(result.report, a.output, files, run);
     if (has_report) {
         write_file(a.report, document);
         console.line("report: " + a.report);
@@ -357,11 +374,21 @@ void add_calibrate(CLI::App& app, Console& console) {
         ->type_name("DEG");
     command->add_flag("--optimize-reference", a.options.optimize_reference,
                       "Estimate the reference intrinsics too.  [default: kept]");
+    command->add_flag("--optimize-lens", a.options.optimize_lens,
+                      "Estimate k1 and k2 of the source's lens, from --source-lens where given, and"
+                      " keep them whether or not unseen frames gain; with --solver adam too."
+                      "  [default: kept where they gain]");
     command
         ->add_option("--working-width", a.options.working_width,
                      "Reference width that calibration works at [px].")
         ->type_name("PX")
         ->check(CLI::Range(1, 2147483647))
+        ->capture_default_str();
+    command
+        ->add_option("--tolerance", a.tolerance,
+                     "Expected error up to which the rig is trusted, over the footage's own depths"
+                     " [px of the reference at 640 px of width].")
+        ->type_name("MEDIAN[,P95]")
         ->capture_default_str();
     command->add_flag("--refine-plane", a.refine_plane,
                       "With --depth plane: find the horizon and the roll from the footage (some 17"

@@ -39,6 +39,10 @@ void put_on_stderr(const std::string& text) {
 
 }  // namespace
 
+void require_trusted(const Rig& rig, const std::string& file) {
+    if (rig.verdict && !rig.verdict->trusted) throw NotTrusted(file + ": " + rig.verdict->line());
+}
+
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 void Console::clear_bar() {

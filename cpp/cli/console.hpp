@@ -7,6 +7,9 @@
 #include <nlohmann/json_fwd.hpp>
 #include <stdexcept>
 #include <string>
+#include <vector>
+
+#include "xcalib/camera.hpp"
 
 namespace xcalib::cli {
 
@@ -22,6 +25,9 @@ class NotTrusted : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+// The same, for a rig whose calibration was not.
+void require_trusted(const Rig& rig, const std::string& file);
+
 // Whoever read our output has gone: nothing is to be said any more.
 class ClosedPipe : public std::runtime_error {
    public:
@@ -31,7 +37,8 @@ class ClosedPipe : public std::runtime_error {
 class Console {
    public:
     bool json = false;
-    bool quiet = false;  // no progress
+    bool quiet = false;                  // no progress
+    std::vector<std::string> arguments;  // of the program
 
     void line(const std::string& text);  // a result, for people; not with --json
     void result(const Json& fields);     // a result, for machines; only with --json

@@ -65,6 +65,7 @@ void run(const Arguments& a, bool has_json, Console& console) {
     if (result.valid_share == 0)
         throw NotTrusted("no pixel is valid in " + std::to_string(frames.size()) +
                          " frames, nothing could be scored");
+    require_trusted(rig, a.rig);
 }
 
 }  // namespace

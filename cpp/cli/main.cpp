@@ -55,6 +55,7 @@ int run(int argc, char** argv, Console& console) {
     add_join(app, console);
     add_bench(app, console);
     for (int i = 1; i < argc; ++i) xcalib::check_name(argv[i]);
+    console.arguments.assign(argv + 1, argv + argc);
     check_command(app, argc, argv);
     std::vector<std::string> arguments(argv + 1, argv + argc);
     const auto name = std::find_if(arguments.begin(), arguments.end(),

@@ -49,6 +49,7 @@ void run(RegisterArguments a, Console& console) {
                     {"frames_per_second", totals.made ? Json(totals.speed()) : Json(nullptr)},
                     {"output", a.output}});
     if (totals.valid == 0) throw NotTrusted("no pixel of " + a.output + " is valid; see its masks");
+    require_trusted(rig, a.rig);
 }
 
 }  // namespace

@@ -112,7 +112,7 @@ XCALIB_C_API void xcalib_destroy(xcalib_registrar* registrar);
  * size, the source's type and channels. `mask`: width * height codes of the reference, without
  * gaps. Pixels that are not valid are 0, but for those that are only marked as occluded.
  *
- * Nothing is allocated as long as the depth has the reference's size.
+ * Nothing is allocated but for the first depth of another size than those before.
  * Several threads may call it at once. */
 XCALIB_C_API xcalib_status xcalib_register(const xcalib_registrar* registrar,
                                            const xcalib_image* source, const xcalib_image* depth,
@@ -122,6 +122,22 @@ XCALIB_C_API xcalib_status xcalib_register(const xcalib_registrar* registrar,
  * there is none. */
 XCALIB_C_API xcalib_status xcalib_map(const xcalib_registrar* registrar, const xcalib_image* depth,
                                       float* map);
+
+/* What became of a transferred point: as in a mask, and XCALIB_AMBIGUOUS: between a near and a far
+ * surface, it belongs to neither. */
+enum { XCALIB_AMBIGUOUS = 4 };
+
+/* `count` points of the reference image, x then y, in the source image, through the depth of the
+ * frame: one channel, XCALIB_F32 [m]. `out`: as many, NaN where there is none, and beyond the image
+ * where they lie outside; `codes`: one a point. An occluded point is given. */
+XCALIB_C_API xcalib_status xcalib_transfer(const xcalib_rig* rig, const xcalib_image* depth,
+                                           const double* points, size_t count, double* out,
+                                           uint8_t* codes);
+
+/* Points of the source image in the reference: of what is in front. */
+XCALIB_C_API xcalib_status xcalib_transfer_back(const xcalib_rig* rig, const xcalib_image* depth,
+                                                const double* points, size_t count, double* out,
+                                                uint8_t* codes);
 
 #ifdef __cplusplus
 }

@@ -19,10 +19,12 @@
 // How its maximum is found: a search over every displacement, then least squares.
 #include "xcalib/search.hpp"
 #include "xcalib/calibration_options.hpp"
+#include "xcalib/verdict.hpp"
 #include "xcalib/calibration_report.hpp"
 #include "xcalib/calibrate.hpp"
 
 // What is done with the rig: kept in a file, and used on a stream of frames.
 #include "xcalib/rig_file.hpp"
 #include "xcalib/register.hpp"
+#include "xcalib/transfer.hpp"
 // clang-format on

@@ -51,6 +51,19 @@ void bind_adam_options(py::module_& m) {
         .as_value();
 }
 
+void bind_tolerance(py::module_& m) {
+    ValueClass<Tolerance>(m, "Tolerance",
+                          "The expected error up to which a calibration is trusted [px of the\n"
+                          "reference when its width is 640 px].")
+        .def_options()
+        .def_readwrite("median", &Tolerance::median, "Over the footage's own depths, > 0.")
+        .def_readwrite("p95", &Tolerance::p95, "Of 95 % of them, > 0.")
+        .def_static("parse", &Tolerance::parse, py::arg("option"), py::arg("text"),
+                    "'2,5' as an option gives it, or '2': 95 % within 2.5 times the median. "
+                    "InputError names the option.")
+        .as_value();
+}
+
 void bind_cameras(ValueClass<CalibrationOptions>& options) {
     options
         .def_readwrite("reference_camera", &CalibrationOptions::reference_camera,
@@ -62,12 +75,17 @@ void bind_cameras(ValueClass<CalibrationOptions>& options) {
                        "of the initial rig, or none.")
         .def_readwrite("source_lens", &CalibrationOptions::source_lens,
                        "Lens of the source's images, frozen. None: that of source_camera or of "
-                       "the initial rig, or none.")
+                       "the initial rig; else k1 and k2 are estimated and kept where unseen frames "
+                       "gain.")
         .def_readwrite("reference_hfov_deg", &CalibrationOptions::reference_hfov_deg,
                        "Horizontal field of view to assume [deg], or None to search it.")
         .def_readwrite("optimize_reference", &CalibrationOptions::optimize_reference,
                        "Free the reference's intrinsics too; they are coupled with the source's. "
                        "The solver 'adam' always does.")
+        .def_readwrite("optimize_lens", &CalibrationOptions::optimize_lens,
+                       "Free k1 and k2 of the source's lens, from source_lens where it is given, "
+                       "and keep them whether or not unseen frames gain; the solver 'adam' has a "
+                       "lens so only.")
         .def_readwrite("relative_depth", &CalibrationOptions::relative_depth,
                        "RelativeDepth that the depth maps were made with: the shift is estimated, "
                        "the scale kept, and the rig has both. None: metric depth.");
@@ -111,6 +129,7 @@ void bind_option_words(py::module_& m) {
 void bind_calibration_options(py::module_& m) {
     bind_search_options(m);
     bind_adam_options(m);
+    bind_tolerance(m);
     ValueClass<CalibrationOptions> options(m, "CalibrationOptions",
                                            "Options of calibrate(). Keyword arguments set fields.");
     options.def_options()
@@ -134,7 +153,8 @@ void bind_calibration_options(py::module_& m) {
             },
             "How the source image is turned: 'auto' (upright, and where that is not found any), "
             "'upright', degrees clockwise as '90', 'mirrored', or both as 'mirrored-90'.")
-        .def_readwrite("search", &CalibrationOptions::search, "SearchOptions.");
+        .def_readwrite("search", &CalibrationOptions::search, "SearchOptions.")
+        .def_readwrite("tolerance", &CalibrationOptions::tolerance, "Tolerance.");
     options
         .def_word("solver", &CalibrationOptions::solver, "solver",
                   "'ceres', or 'adam' as published, which searches nothing.")

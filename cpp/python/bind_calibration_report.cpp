@@ -1,9 +1,10 @@
 #include <pybind11/stl.h>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "json.hpp"
 #include "value_class.hpp"
-#include "xcalib/calibration_report.hpp"
+#include "xcalib/calibrate.hpp"
 
 namespace xcalib {
 namespace {
@@ -101,9 +102,12 @@ void bind_calibration_report(py::module_& m) {
     bind_lens_report(m);
     bind_adam_step(m);
     bind_lag_report(m);
+    // The model behind expected_error_map() is copied with it, but not pickled.
     ValueClass<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
+        .def_readonly("verdict", &CalibrationReport::verdict, "Verdict.")
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
-        .def_readonly("message", &CalibrationReport::message, "Why, in one line.")
+        .def_readonly("message", &CalibrationReport::message,
+                      "Why, and what to do next, in one line.")
         .def_readonly("seconds", &CalibrationReport::seconds, "[s]")
         .def_property_readonly(
             "time",
@@ -120,8 +124,9 @@ void bind_calibration_report(py::module_& m) {
                       "Typical of rigs displaced by many pixels.")
         .def_readonly("contrast", &CalibrationReport::contrast,
                       "NEC above the baseline, in deviations over displacements.")
-        .def_readonly("repeatability_px", &CalibrationReport::repeatability_px,
-                      "Median distance between fits to two halves of the frames [working px].")
+        .def_readonly(
+            "repeatability_px", &CalibrationReport::repeatability_px,
+            "Median distance between the calibrations of two halves of the frames [working px].")
         .def_readonly(
             "visible_shift_px", &CalibrationReport::visible_shift_px,
             "Shift, linear over the image, that flow between the registered images still sees:\n"
@@ -129,6 +134,12 @@ void bind_calibration_report(py::module_& m) {
             "known.")
         .def_readonly("valid_share", &CalibrationReport::valid_share,
                       "Share of the reference's edge energy.")
+        .def_readonly("weak_directions", &CalibrationReport::weak_directions,
+                      "What can slide, and with what, while the footage's pixels move by a tenth "
+                      "of a pixel.")
+        .def_readonly("near_m", &CalibrationReport::near_m, "Depth that 5 % are nearer than [m].")
+        .def_readonly("middle_m", &CalibrationReport::middle_m, "Median depth [m].")
+        .def_readonly("far_m", &CalibrationReport::far_m, "Depth that 95 % are nearer than [m].")
         .def_readonly("frames", &CalibrationReport::frames, "Indices of the pairs used.")
         .def_readonly("candidates", &CalibrationReport::candidates,
                       "Candidates of the search, best score first.")
@@ -136,6 +147,15 @@ void bind_calibration_report(py::module_& m) {
         .def_readonly("lens", &CalibrationReport::lens, "LensReport, of solver 'ceres'.")
         .def_readonly("steps", &CalibrationReport::steps, "AdamStep, of solver 'adam'.")
         .def_readonly("lag", &CalibrationReport::lag, "LagReport, where the footage is a sequence.")
+        .def(
+            "expected_error_map",
+            [](const CalibrationReport& report, double depth, int width, int height, double share) {
+                return array_of(expected_error_map(report, depth, width, height, share));
+            },
+            py::arg("depth"), py::arg("width") = 64, py::arg("height") = 48, py::arg("share") = 0.5,
+            "(height, width) float32 over the reference image: the length that `share` of the "
+            "errors at a depth [m] do not exceed [px of the reference when its width is 640 px]; "
+            "NaN where the source sees nothing.")
         .def("brief", &CalibrationReport::brief, "One line.")
         .def("full", &CalibrationReport::full, "A table.")
         .def(

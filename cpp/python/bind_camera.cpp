@@ -184,6 +184,9 @@ void bind_rig(py::module_& m) {
         .def_readwrite("source_mirrored", &Rig::source_mirrored,
                        "Whether the source image is a mirror image: u = cx - fx X/Z + skew Y/Z.")
         .def_property_readonly(
+            "verdict", [](const Rig& rig) { return std::const_pointer_cast<Verdict>(rig.verdict); },
+            "Verdict of the calibration that estimated it, or None where it is not known.")
+        .def_property_readonly(
             "mount", [](const Rig& rig) { return Mount::of(rig).text(); },
             "How the source image is turned against the reference's, in words: 'upright' up to 15 "
             "deg of roll, 'upside down', 'turned by 90 deg clockwise', 'mirrored', ...");

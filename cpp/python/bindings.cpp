@@ -30,6 +30,7 @@ PYBIND11_MODULE(_core, m) {
         .attr("__doc__") = "A file that cannot be decoded: truncated, or not what its name says.";
 
     // In this order: signatures name the classes that are known by then.
+    xcalib::bind_verdict(m);
     xcalib::bind_lens(m);
     xcalib::bind_camera(m);
     xcalib::bind_calibration_options(m);
@@ -53,6 +54,7 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_steady_depth(m);
 
     xcalib::bind_stream(m);
+    xcalib::bind_transfer(m);
     xcalib::bind_sequence(m);
     xcalib::bind_pairs(m);
     xcalib::bind_frames(m);

@@ -7,6 +7,7 @@
 
 namespace xcalib {
 
+void bind_verdict(pybind11::module_& m);
 void bind_lens(pybind11::module_& m);
 void bind_camera(pybind11::module_& m);
 void bind_calibration_options(pybind11::module_& m);
@@ -31,6 +32,7 @@ void bind_complete_depth(pybind11::module_& m);
 void bind_steady_depth(pybind11::module_& m);
 
 void bind_stream(pybind11::module_& m);
+void bind_transfer(pybind11::module_& m);
 void bind_pairs(pybind11::module_& m);
 void bind_sequence(pybind11::module_& m);
 void bind_frames(pybind11::module_& m);

@@ -9,13 +9,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from xcalib import metrics
+    from xcalib import convert, labels, metrics
     from xcalib._core import (
         AdamOptions,
         CalibrationOptions,
         CalibrationReport,
         CalibrationResult,
         CandidateReport,
+        ExpectedError,
+        FrameTransfer,
         LagFit,
         LagReport,
         Lens,
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
         RelativeDepth,
         Rig,
         SearchOptions,
+        Tolerance,
+        Verdict,
         calibrate,
         fit_lags,
     )
@@ -40,8 +44,8 @@ else:
         """Import what a name stands for when it is first used: `xcalib --version` needs nothing."""
         if name == "__version__":
             value = import_module("importlib.metadata").version("xcalib-rgbt")
-        elif name == "metrics":
-            value = import_module("xcalib.metrics")
+        elif name in ("convert", "labels", "metrics"):
+            value = import_module(f"xcalib.{name}")
         elif name in IN_PYTHON:
             value = getattr(import_module(f"xcalib.{IN_PYTHON[name]}"), name)
         elif name in __all__:
@@ -61,6 +65,8 @@ __all__ = [
     "CalibrationReport",
     "CalibrationResult",
     "CandidateReport",
+    "ExpectedError",
+    "FrameTransfer",
     "LagFit",
     "LagReport",
     "Lens",
@@ -71,9 +77,13 @@ __all__ = [
     "RelativeDepth",
     "Rig",
     "SearchOptions",
+    "Tolerance",
+    "Verdict",
     "calibrate",
     "choose_frames",
+    "convert",
     "evaluate",
     "fit_lags",
+    "labels",
     "metrics",
 ]

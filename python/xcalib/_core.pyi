@@ -114,6 +114,54 @@ class RelativeDepth:
     def shift(self) -> float:
         """[1/m], if the scale is of metres."""
 
+class ExpectedError:
+    """How far the registered source is expected to lie from where it belongs [px of the
+    reference when its width is 640 px].
+    """
+    @property
+    def median(self) -> float:
+        """Half of the pixels are no farther off."""
+    @property
+    def p95(self) -> float:
+        """95 % of the pixels are no farther off."""
+    def __iter__(self) -> Iterator[float]: ...
+
+class Verdict:
+    """Is a calibration to be trusted, and how far off is it?"""
+    @property
+    def trusted(self) -> bool:
+        """Found, plausible, and the expected error within the tolerance."""
+    @property
+    def found(self) -> bool:
+        """Two calibrations that share no frame agree."""
+    @property
+    def reason(self) -> str:
+        """Why it is, or is not, to be trusted."""
+    @property
+    def advice(self) -> str:
+        """What to do next; empty where it is trusted."""
+    @property
+    def expected_error(self) -> ExpectedError:
+        """ExpectedError over the depths that the footage has."""
+    @property
+    def by_depth(self) -> dict[float, ExpectedError]:
+        """ExpectedError by depth [m], nearest first; empty for relative depth."""
+    @property
+    def frames(self) -> int:
+        """Number of pairs that it rests on."""
+    @property
+    def date(self) -> str:
+        """Of the calibration, YYYY-MM-DD (UTC)."""
+    @property
+    def software(self) -> str:
+        """That made it, and its version."""
+    def line(self) -> str:
+        """Reason and advice."""
+    def error_at(self, depth: float) -> ExpectedError:
+        """ExpectedError at a depth [m], in proportion to inverse depth between those of
+        by_depth; NaN where there is none, or the depth is not positive.
+        """
+
 class Rig:
     """A reference and a source camera, fixed to each other.
 
@@ -145,6 +193,9 @@ class Rig:
     def quaternion_wxyz(self) -> NDArray[float64]:
         """(4,) float64 unit quaternion of R."""
     @property
+    def verdict(self) -> Verdict | None:
+        """Verdict of the calibration that estimated it, or None where it is not known."""
+    @property
     def mount(self) -> str:
         """How the source image is turned against the reference's, in words: 'upright' up to 15
         deg of roll, 'upside down', 'turned by 90 deg clockwise', 'mirrored', ...
@@ -168,6 +219,50 @@ class Rig:
     ) -> Rig:
         """The rig for images of these sizes [px]: itself, or resized where both have its
         aspects, to within a pixel. Raises InputError where one has not.
+        """
+    def transfer(
+        self, points: ArrayLike, depth: NDArray[Any] | ArrayLike, beyond: bool = False
+    ) -> NDArray[float64]:
+        """Points (N, 2) of the reference image in the source image: (N, 2) [px].
+
+        depth: the frame's map (h, w) float32 [m], a number [m], or one of each point, (N,).
+        NaN where there is none: outside of the source image (beyond: only where the camera
+        cannot see), or the depth unknown. What the source sees something nearer in front of
+        is given: FrameTransfer says so.
+        """
+    def transfer_back(
+        self, points: ArrayLike, depth: NDArray[Any] | ArrayLike, beyond: bool = False
+    ) -> NDArray[float64]:
+        """Points (N, 2) of the source image in the reference image: (N, 2) [px].
+
+        depth: the frame's map (h, w) float32 [m] of the reference, or of each point its depth
+        in the reference camera, a number or (N,). With a map it is what is in front that
+        counts. NaN where there is none: outside of the reference image (beyond: given too
+        where depth is a number), depth unknown, or between a near and a far surface.
+        """
+
+class FrameTransfer:
+    """Points from either image of a frame to the other, through its depth.
+
+    Codes are those of a mask: 0 valid, 1 outside (or nothing there that the reference shows),
+    2 occluded (the source sees something nearer; the point is given), 3 no depth, and 4
+    ambiguous (between a near and a far surface).
+    """
+    def __init__(self, rig: Rig, depth: NDArray[Any]) -> None:
+        """depth: (h, w) float32 [m], of any size of the reference's aspect, 0 unknown."""
+    def to_source(
+        self, points: ArrayLike
+    ) -> tuple[NDArray[float64], NDArray[float64], NDArray[uint8]]:
+        """(points, depths, codes) of reference points (N, 2): (N, 2) [px], which lie beyond the
+        image where they are outside; depth in the reference camera (N,) [m]; (N,) uint8.
+        """
+    def to_reference(
+        self, points: ArrayLike
+    ) -> tuple[NDArray[float64], NDArray[float64], NDArray[uint8]]:
+        """The same of source points (N, 2); NaN where not valid."""
+    def inverse_map(self, width: int, height: int) -> NDArray[float32]:
+        """(height, width, 2) float32 of the source's size: reference coordinates of each source
+        pixel [px], NaN where there are none. The inverse of Registrar.map().
         """
 
 class SearchOptions:
@@ -213,6 +308,21 @@ class AdamOptions:
 
     def __init__(self, **kwargs: Any) -> None: ...
 
+class Tolerance:
+    """The expected error up to which a calibration is trusted [px of the
+    reference when its width is 640 px].
+    """
+    def __init__(self, **kwargs: Any) -> None: ...
+    median: float
+    """Over the footage's own depths, > 0."""
+    p95: float
+    """Of 95 % of them, > 0."""
+    @staticmethod
+    def parse(option: str, text: str) -> Tolerance:
+        """'2,5' as an option gives it, or '2': 95 % within 2.5 times the median. InputError
+        names the option.
+        """
+
 class CalibrationOptions:
     """Options of calibrate(). Keyword arguments set fields."""
 
@@ -243,14 +353,18 @@ class CalibrationOptions:
     rig, or none.
     """
     source_lens: Lens | None
-    """Lens of the source's images, frozen. None: that of source_camera or of the initial rig, or
-    none.
+    """Lens of the source's images, frozen. None: that of source_camera or of the initial rig;
+    else k1 and k2 are estimated and kept where unseen frames gain.
     """
     reference_hfov_deg: float | None
     """Horizontal field of view to assume [deg], or None to search it."""
     optimize_reference: bool
     """Free the reference's intrinsics too; they are coupled with the source's. The solver 'adam'
     always does.
+    """
+    optimize_lens: bool
+    """Free k1 and k2 of the source's lens, from source_lens where it is given, and keep them
+    whether or not unseen frames gain; the solver 'adam' has a lens so only.
     """
     relative_depth: RelativeDepth | None
     """RelativeDepth that the depth maps were made with: the shift is estimated, the scale kept,
@@ -262,6 +376,8 @@ class CalibrationOptions:
     """
     search: SearchOptions
     """SearchOptions."""
+    tolerance: Tolerance
+    """Tolerance."""
     solver: str
     """'ceres', or 'adam' as published, which searches nothing."""
     adam: AdamOptions
@@ -412,11 +528,14 @@ class LagReport:
 class CalibrationReport:
     """How a calibration went."""
     @property
+    def verdict(self) -> Verdict:
+        """Verdict."""
+    @property
     def converged(self) -> bool:
         """Is the rig to be trusted?"""
     @property
     def message(self) -> str:
-        """Why, in one line."""
+        """Why, and what to do next, in one line."""
     @property
     def seconds(self) -> float:
         """[s]"""
@@ -444,7 +563,7 @@ class CalibrationReport:
         """NEC above the baseline, in deviations over displacements."""
     @property
     def repeatability_px(self) -> float:
-        """Median distance between fits to two halves of the frames [working px]."""
+        """Median distance between the calibrations of two halves of the frames [working px]."""
     @property
     def visible_shift_px(self) -> float:
         """Shift, linear over the image, that flow between the registered images still sees:
@@ -454,6 +573,18 @@ class CalibrationReport:
     @property
     def valid_share(self) -> float:
         """Share of the reference's edge energy."""
+    @property
+    def weak_directions(self) -> list[str]:
+        """What can slide, and with what, while the footage's pixels move by a tenth of a pixel."""
+    @property
+    def near_m(self) -> float:
+        """Depth that 5 % are nearer than [m]."""
+    @property
+    def middle_m(self) -> float:
+        """Median depth [m]."""
+    @property
+    def far_m(self) -> float:
+        """Depth that 95 % are nearer than [m]."""
     @property
     def frames(self) -> list[int]:
         """Indices of the pairs used."""
@@ -472,6 +603,13 @@ class CalibrationReport:
     @property
     def lag(self) -> LagReport:
         """LagReport, where the footage is a sequence."""
+    def expected_error_map(
+        self, depth: float, width: int = 64, height: int = 48, share: float = 0.5
+    ) -> NDArray[float32]:
+        """(height, width) float32 over the reference image: the length that `share` of the
+        errors at a depth [m] do not exceed [px of the reference when its width is 640 px];
+        NaN where the source sees nothing.
+        """
     def brief(self) -> str:
         """One line."""
     def full(self) -> str:
@@ -1092,9 +1230,20 @@ def _option_words() -> dict[str, list[str]]:
 def _flow_arguments() -> dict[str, str]:
     """CalibrationOptions.flow by what --flow of the command takes."""
 
-def report_document(report: CalibrationReport, rig_file: str, files: Sequence[str]) -> str:
-    """JSON text of a report, as `xcalib calibrate --report` writes it; files: those of its
-    frames.
+def report_document(
+    report: CalibrationReport,
+    rig_file: str,
+    files: Sequence[str],
+    arguments: Sequence[str],
+    directory: str,
+    lag: int,
+    choice: Sequence[tuple[str, bool, str]],
+) -> str:
+    """JSON text of a report, as `xcalib calibrate --report` writes it.
+
+    files: those of its frames. arguments: of `xcalib`, which was run in directory. lag: of
+    the sources, that was taken up [frames]. choice: (file, taken, reason) of the frames
+    looked at.
     """
 
 def evaluation_document(evaluation: Evaluation, rig_file: str, files: Sequence[str]) -> str:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from . import metrics, synthetic
-from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig
-from .frames import Image, check_folder_writable, display_gray, overlay, size_of, write_image
+from ._core import CalibrationOptions, CalibrationResult, Registrar, Rig, report_document
+from .frames import check_folder_writable, size_of, write_bytes, write_image
 from .inputs import Inputs
+from .overlays import Picture, colour, with_edges
 from .pipeline import Frames, run_calibration, save_rig
 from .progress import progress
 from .registration import RegistrationOptions, run_registration
+from .report import Run, write_page
 
 
 def run_demo(
@@ -47,7 +49,7 @@ def run_demo(
     # An earlier and longer demo may have left frames behind these.
     references, sources = everything.references[:num_frames], everything.sources[:num_frames]
     frames = Frames(references, sources, everything.depth)
-    result, _ = run_calibration(frames, CalibrationOptions(seed=seed), quiet=quiet)
+    result, chosen = run_calibration(frames, CalibrationOptions(seed=seed), quiet=quiet)
     save_rig(result.rig, output / "rig.yaml")
     options = RegistrationOptions(overwrite=True)
     total = run_registration(frames, result.rig, output / "registered", options, quiet=quiet)
@@ -58,9 +60,24 @@ def run_demo(
     before, after = before_and_after(frames, result.rig)
     write_image(output / "before.png", before)
     write_image(output / "after.png", after)
-    for name in ("data", "rig.yaml", "registered", "before.png", "after.png"):
+    write_report(output, frames, result, chosen, seed)
+    for name in ("data", "rig.yaml", "registered", "before.png", "after.png", "report.html"):
         say(f"{name + ':':<12} {output / name}")
     return result
+
+
+def write_report(
+    output: Path, frames: Frames, result: CalibrationResult, chosen: Sequence[int], seed: int
+) -> None:
+    """The report, and the page of it; its command does the same from the files."""
+    folders = ("data/visible", "data/thermal", "--depth", "data/depth")
+    files = [str(Path(frames.references.where(index)).relative_to(output)) for index in chosen]
+    command = ["calibrate", *folders, "--choose", "spread", "--seed", str(seed), "-o", "rig.yaml"]
+    folder = str(output.absolute())
+    document = report_document(result.report, "rig.yaml", files, command, folder, 0, [])
+    write_bytes(output / "report.json", document.encode())
+    run = Run(json.loads(document), result.rig, frames, chosen)
+    write_page(run, output / "report.html", "The demo: a rig in a rendered street")
 
 
 def against_truth(rig: Rig, truth: Rig, frames: Frames) -> str:
@@ -86,21 +103,16 @@ def against_truth(rig: Rig, truth: Rig, frames: Frames) -> str:
     return "\n".join([head, *(f"{name:<16}{found:<40}{true}" for name, found, true in rows)])
 
 
-def before_and_after(frames: Frames, rig: Rig) -> tuple[Image, Image]:
-    """Visible, thermal and their overlay side by side: thermal only resized, and registered."""
+def before_and_after(frames: Frames, rig: Rig) -> tuple[Picture, Picture]:
+    """Visible, thermal and its edges on the visible image side by side: only resized, and
+    registered.
+    """
     reference, source, depth = frames.read(0)
     registered, mask = Registrar(frames.fit(rig)).register(source, depth)
     resized = cv2.resize(source, size_of(reference), interpolation=cv2.INTER_AREA)
-    before = [colour(reference), colour(resized), overlay(reference, resized)]
-    after = [colour(reference), colour(registered), overlay(reference, registered, mask)]
+    before = [colour(reference), colour(resized), with_edges(reference, resized)]
+    after = [colour(reference), colour(registered), with_edges(reference, registered, mask == 0)]
     return np.hstack(before), np.hstack(after)
-
-
-def colour(image: Image) -> NDArray[np.uint8]:
-    """8-bit colour ``(H, W, 3)`` of an image, for a picture beside others."""
-    if image.dtype != np.uint8:
-        image = display_gray(image)
-    return image if image.ndim == 3 else np.dstack([image] * 3)
 
 
 def vector(values: Iterable[float]) -> str:

@@ -21,6 +21,14 @@ void* counted(std::size_t size) {
 
 void* operator new(std::size_t size) { return counted(size); }
 void* operator new[](std::size_t size) { return counted(size); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+    ++allocations;
+    const auto to = static_cast<std::size_t>(alignment);
+    if (void* memory = std::aligned_alloc(to, (size + to - 1) / to * to)) return memory;
+    throw std::bad_alloc();
+}
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete[](void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
@@ -55,6 +63,31 @@ TEST(Registrar, AllocatesNothingForAFrame) {
             EXPECT_EQ(allocations, before)
                 << threads << " threads, occlusion " << static_cast<int>(occlusion);
         }
+}
+
+TEST(Registrar, AllocatesNothingForDepthOfAnotherSize) {
+    Rig rig{Pinhole::from_hfov(320, 240, 0.9), Pinhole::from_hfov(160, 128, 0.9), {}};
+    rig.source_from_reference.translation = {-0.3, 0.01, 0.02};
+    const std::vector<std::uint8_t> source(160 * 128, 99);
+    std::vector<std::uint8_t> out(320 * 240), mask(320 * 240);
+    for (const int threads : {1, 4}) {
+        const Registrar registrar(rig, {threads, false, Occlusion::mark, 0});
+        for (const int width : {640, 160, 130, 330}) {
+            const int height = 3 * width / 4;
+            std::vector<float> depth(static_cast<std::size_t>(width) * height);
+            for (std::size_t i = 0; i < depth.size(); ++i) depth[i] = i % 7 ? 3.0f : 9.0f;
+            const auto frame = [&] {
+                registrar.register_frame(
+                    {source.data(), 160, 128, 1, PixelType::u8, 160},
+                    {depth.data(), width, height, 1, PixelType::f32, 4 * width},
+                    {out.data(), 320, 240, 1, PixelType::u8, 320}, mask.data());
+            };
+            frame();  // the first of a size makes room
+            const long before = allocations;
+            for (int i = 0; i < 10; ++i) frame();
+            EXPECT_EQ(allocations, before) << threads << " threads, " << width << "x" << height;
+        }
+    }
 }
 
 TEST(CApi, AllocatesNothingForAFrame) {

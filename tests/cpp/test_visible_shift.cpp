@@ -47,11 +47,17 @@ TEST(Verdict, AFitThatFlowSeesToBeOffIsNotTrusted) {
     const Scene scene = make_scene(6, 150, 4);
     CalibrationReport report;
     report.valid_share = 0.9;
-    report.levels.emplace_back().aligned = 1;
     const Plan plan{CalibrationOptions{}};
-    judge(scene.images, scene.truth, plan, report);
+    const auto halves = [](const Rig& rig) {
+        Halves same;
+        same.rigs = {rig, rig};
+        same.independent = true;
+        return same;
+    };
+    judge(scene.images, finest(scene), scene.truth, halves(scene.truth), plan, report);
     EXPECT_TRUE(report.converged) << report.message;
-    judge(scene.images, turned(scene.truth, {0.012, -0.012, 0.0}), plan, report);
+    const Rig off = turned(scene.truth, {0.012, -0.012, 0.0});
+    judge(scene.images, finest(scene), off, halves(off), plan, report);
     EXPECT_FALSE(report.converged);
     EXPECT_GT(report.visible_shift_px, 3);
     EXPECT_NE(report.message.find("still sees a shift of"), std::string::npos) << report.message;

@@ -18,6 +18,9 @@ struct Scene {
     std::vector<Image> depths;
 };
 
+// The finest level of all pairs.
+inline Level finest(const Scene& scene) { return make_level(scene.images, 1, scene.truth, 2); }
+
 // Three pairs of a rig with the source's contrast reversed, depth exact: `count` blobs, `sigma` px
 // wide.
 inline Scene make_scene(unsigned seed, int count = 60, double sigma = 4) {

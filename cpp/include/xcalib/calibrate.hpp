@@ -21,6 +21,9 @@ struct CalibrationResult {
     Rig rig;
     bool converged = false;
     CalibrationReport report;
+
+    // For what is found out about the footage later. The report's message keeps what it said.
+    void distrust(const std::string& reason, const std::string& advice);
 };
 
 // Called with the stage and the share of all work done, (0, 1], from the calling thread.
@@ -36,5 +39,11 @@ CalibrationResult calibrate(const std::vector<ImageView>& references,
                             const CalibrationOptions& options = {},
                             const Progress& progress = nullptr,
                             const FlowEstimator& flow = nullptr);
+
+// How far off each pixel of the reference is expected to be at a depth [m]: the length that `share`
+// of errors there, (0, 1), do not exceed [px of the reference when its width is 640 px], drawn on a
+// grid of this size that covers the image. NaN where the source sees nothing of it.
+Image expected_error_map(const CalibrationReport& report, double depth, int width, int height,
+                         double share = 0.5);
 
 }  // namespace xcalib

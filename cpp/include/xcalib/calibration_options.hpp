@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "xcalib/camera.hpp"
 #include "xcalib/export.hpp"
@@ -53,6 +54,17 @@ struct SearchOptions {
     void validate() const;  // throws std::invalid_argument: field, value, range
 };
 
+// The expected error up to which a calibration is trusted, over the footage's own depths [px of the
+// reference when its width is 640 px].
+struct Tolerance {
+    double median = 2.0;  // > 0
+    double p95 = 5.0;     // > 0
+
+    // "2,5" as an option gives it, or "2": 95 % within 2.5 times the median. Throws InputError that
+    // names the option.
+    static Tolerance parse(const std::string& option, const std::string& text);
+};
+
 struct CalibrationOptions {
     int max_frames = 32;        // pairs used, spread over the footage, >= 1
     std::uint32_t seed = 0;     // of the frame choice
@@ -77,6 +89,9 @@ struct CalibrationOptions {
     // The reference's intrinsics and the source's are coupled (a gauge): free only on request, save
     // with Solver::adam, which frees them as published.
     bool optimize_reference = false;
+    // k1 and k2 of the source's lens move with everything else, from those of `source_lens` where
+    // it is given, and are kept whether or not unseen frames gain by them; with Solver::adam too.
+    bool optimize_lens = false;
 
     // The depth maps are 1 / (scale r + shift) of relative inverse depth: the shift is estimated,
     // the scale stays as the gauge of the translation, and the rig has both. None: metric.
@@ -86,6 +101,7 @@ struct CalibrationOptions {
     // for.
     std::optional<Mount> mount;
     SearchOptions search;
+    Tolerance tolerance;
     Solver solver = Solver::ceres;
     AdamOptions adam;
 

@@ -1,12 +1,14 @@
 // What a calibration found out about itself.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "xcalib/calibration_times.hpp"
 #include "xcalib/camera.hpp"
 #include "xcalib/export.hpp"
+#include "xcalib/verdict.hpp"
 
 namespace XCALIB_EXPORT xcalib {
 
@@ -49,6 +51,7 @@ struct AdamStep {
     double total = 0.0;  // Eq. (total_loss)
 };
 
+class ErrorModel;  // calibrate.hpp: expected_error_map
 // The fit with the sources some frames later, refitted.
 struct LagFit {
     int lag = 0;         // that a source is later than its own frame [source frames]
@@ -73,23 +76,28 @@ struct LagReport {
 };
 
 struct CalibrationReport {
-    bool converged = false;
-    std::string message;  // one line: why the result is, or is not, to be trusted
+    Verdict verdict;
+    bool converged = false;  // verdict.trusted
+    std::string message;     // one line: why the result is, or is not, to be trusted
     double seconds = 0.0;
     CalibrationTimes time;
     int working_width = 0, working_height = 0;
     double nec = 0.0;               // at the finest level
     double baseline_nec = 0.0;      // at half that size, of the rig turned off its place
     double contrast = 0.0;          // of the NEC above that, in its deviations over displacements
-    double repeatability_px = 0.0;  // between fits to two halves of the frames [working px]
+    double repeatability_px = 0.0;  // between calibrations of half of the frames each [working px]
     double visible_shift_px = 0.0;  // that flow still sees [working px]; NaN where it is not known
     double valid_share = 0.0;
-    std::vector<int> frames;  // indices of the pairs used
+    double near_m = 0.0, middle_m = 0.0, far_m = 0.0;  // depths that 5, 50 and 95 % are nearer than
+    std::vector<int> frames;                           // indices of the pairs used
     std::vector<CandidateReport> candidates;
     std::vector<LevelReport> levels;
     LensReport lens;
     std::vector<AdamStep> steps;  // of Solver::adam
-    LagReport lag;                // of fit_lags(), where the footage was a sequence
+    std::shared_ptr<const ErrorModel> errors;
+    // What can slide, and with what, while the footage's pixels move by a tenth of a pixel.
+    std::vector<std::string> weak_directions;
+    LagReport lag;  // of fit_lags(), where the footage was a sequence
 
     std::string brief() const;  // one line
     std::string full() const;   // a table

@@ -7,10 +7,12 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <memory>
 #include <optional>
 
 #include "xcalib/export.hpp"
 #include "xcalib/lens.hpp"
+#include "xcalib/verdict.hpp"
 
 namespace XCALIB_EXPORT xcalib {
 
@@ -86,6 +88,8 @@ struct Rig {
     // The source's image is a mirror image: its columns count against the camera's x axis,
     // u = cx - fx X/Z + skew Y/Z. Its lens, like all of `source`, is that of the image as it is.
     bool source_mirrored = false;
+    // Of the calibration that estimated it; none: unknown.
+    std::shared_ptr<const Verdict> verdict = nullptr;
 
     Eigen::Matrix3d R() const { return source_from_reference.rotation.toRotationMatrix(); }
     const Eigen::Vector3d& t() const { return source_from_reference.translation; }

@@ -49,9 +49,9 @@ class Registrar {
     // Samples `source` on the reference grid. `registered` has the source's type and channels and
     // the reference's size; `mask` takes width * height Validity codes. Pixels that are not valid
     // are 0, but for those that are only marked as occluded. Nothing is
-    // allocated as long as the depth has the reference's size. Several threads may call it at once,
-    // each beyond the first with buffers of its own; in a forked process, the caller's works alone.
-    // Throws std::invalid_argument where a size or type does not fit.
+    // allocated but for the first depth of another size than those before. Several threads may call
+    // it at once, each beyond the first with buffers of its own; in a forked process, the caller's
+    // works alone. Throws std::invalid_argument where a size or type does not fit.
     void register_frame(const ImageView& source, const ImageView& depth,
                         const MutableImageView& registered, std::uint8_t* mask) const;
 

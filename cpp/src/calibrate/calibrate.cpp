@@ -11,8 +11,10 @@
 #include "calibrate/adam.hpp"
 #include "calibrate/find_mounts.hpp"
 #include "calibrate/fit_lens.hpp"
+#include "calibrate/halves.hpp"
 #include "calibrate/relative_depth.hpp"
 #include "calibrate/start.hpp"
+#include "calibrate/static_edges.hpp"
 #include "calibrate/study.hpp"
 #include "calibrate/verdict.hpp"
 #include "solve/solve.hpp"
@@ -48,9 +50,9 @@ void validate(const std::vector<ImageView>& references, const std::vector<ImageV
 }
 
 // Levenberg-Marquardt on all frames, from the level at which the start was found on some of them. A
-// lens that is kept on the way moves from there on.
-void refine(const WorkingImages& images, const Start& found, Plan& plan, const Progress& notify,
-            CalibrationResult& result) {
+// lens that is kept on the way moves from there on. Returns the finest level.
+Level refine(const WorkingImages& images, const Start& found, Plan& plan, const Progress& notify,
+             CalibrationResult& result) {
     CalibrationReport& report = result.report;
     const int num_threads = plan.options.num_threads;
     report.candidates = found.candidates;
@@ -64,9 +66,10 @@ void refine(const WorkingImages& images, const Start& found, Plan& plan, const P
     const auto tolerance = [](int factor) { return factor == 2 ? 1e-6 : 1e-5; };
     const std::vector<Step> steps =
         schedule(report.working_width, report.working_height, plan.parts);
+    Level level;
     for (std::size_t s = 0; s < steps.size(); ++s) {
         if (steps[s].stage == 1 || steps[s].factor > from) continue;
-        const Level level = make_level(images, steps[s].factor, result.rig, num_threads);
+        level = make_level(images, steps[s].factor, result.rig, num_threads);
         if (limit == 0) limit = share_limit(pooled(level, result.rig, num_threads).valid_share);
         report.levels.push_back(solve_stage(images, level, steps[s].stage, limit,
                                             tolerance(steps[s].factor), plan, result.rig));
@@ -78,6 +81,7 @@ void refine(const WorkingImages& images, const Start& found, Plan& plan, const P
         notify("refine",
                0.6 + 0.35 * static_cast<double>(s + 1) / static_cast<double>(steps.size()));
     }
+    return level;
 }
 
 // The footage, and how it is looked at in one attempt: sources that a mount mirrors are flipped, so
@@ -127,14 +131,16 @@ void settle_relative_depth(Attempt& attempt, CalibrationResult& result) {
 }
 
 // From a rig to a result: what is left once it is solved.
-void settle(Attempt& attempt, CalibrationResult& result) {
+void settle(Attempt& attempt, const Level& finest, const Halves& halves,
+            CalibrationResult& result) {
     CalibrationReport& report = result.report;
-    if (attempt.plan.options.relative_depth) settle_relative_depth(attempt, result);
     report.nec = report.levels.back().nec;
     report.valid_share = report.levels.back().valid_share;
-    judge(*attempt.images, result.rig, attempt.plan, report);
+    judge(*attempt.images, finest, result.rig, halves, attempt.plan, report);
+    if (attempt.plan.options.relative_depth) settle_relative_depth(attempt, result);
     result.converged = report.converged;
     result.rig = attempt.given(result.rig);
+    result.rig.verdict = std::make_shared<const Verdict>(report.verdict);
     const std::string mount = Mount::of(result.rig).text();
     if (mount != Mount{}.text()) report.message += "; the source image is " + mount;
     if (const Lens& lens = result.rig.source.lens; report.lens.coefficients > 0)
@@ -146,26 +152,58 @@ void settle(Attempt& attempt, CalibrationResult& result) {
     }
 }
 
-// The best start of the mounts that the footage may have, and how it is looked at; none where the
-// edges of no other agree clearly better than those of `upright`.
-struct Turned {
-    Attempt attempt;
-    Start start;
-};
-std::optional<Turned> best_turned(const std::shared_ptr<const WorkingImages>& images,
-                                  const ImageView& reference, const ImageView& source,
-                                  const Plan& plan, const Start& upright) {
+// The same where nothing was searched.
+void settle_refit(Attempt& attempt, const Level& finest, CalibrationResult& result) {
+    settle(attempt, finest,
+           refit_halves(*attempt.images, result.rig, attempt.plan,
+                        result.report.levels.back().valid_share),
+           result);
+}
+
+// Two calibrations, each of half of the frames, and from the better of them one of all. Returns how
+// well edges agree at its start.
+double fit(Attempt& attempt, const ImageView& reference, const ImageView& source,
+           const Progress& notify, double& search_seconds, CalibrationResult& result) {
+    Plan& plan = attempt.plan;
+    const WorkingImages& images = *attempt.images;
+    const auto searching = [&](double share) { notify("search", 0.05 + 0.55 * share); };
+    if (!plan.searches) {  // there is nothing that two halves could find apart
+        const Start start = find_start(images, reference, source, attempt.initial, plan, searching);
+        search_seconds += start.search_seconds;
+        const Level finest = refine(images, start, plan, notify, result);
+        settle_refit(attempt, finest, result);
+        return start.merit;
+    }
+    const Halves halves = fit_halves(images, reference, source, attempt.initial, plan, searching);
+    std::optional<Start> start = halves.start;
+    // Where they disagree, half of the frames may have been too few.
+    if (!agree(halves, images)) {
+        Start whole = find_start(images, reference, source, attempt.initial, plan, [](double) {});
+        if (!start || merit_on(images, whole.rig, plan) > merit_on(images, start->rig, plan))
+            start = std::move(whole);
+    }
+    search_seconds += start->search_seconds;
+    const Level finest = refine(images, *start, plan, notify, result);
+    settle(attempt, finest, halves, result);
+    return start->merit;
+}
+
+// The best of the mounts that the footage may have, and how it is looked at; none where the edges
+// of no other agree clearly better than those of the upright one.
+std::optional<Attempt> best_turned(const std::shared_ptr<const WorkingImages>& images,
+                                   const ImageView& reference, const ImageView& source,
+                                   const Plan& plan, double upright_merit) {
     constexpr std::size_t kMounts = 2;
     constexpr double kClearly = 1.15;
-    std::optional<Turned> best;
-    double merit = kClearly * upright.merit;
+    std::optional<Attempt> best;
+    double merit = kClearly * upright_merit;
     for (const Mount& mount : find_mounts(*images, reference, source, plan, kMounts)) {
         Attempt attempt(images, plan, std::nullopt, mount);
-        Start start = find_start(*attempt.images, reference, source, std::nullopt, attempt.plan,
-                                 [](double) {});
+        const Start start = find_start(*attempt.images, reference, source, std::nullopt,
+                                       attempt.plan, [](double) {});
         if (start.merit <= merit) continue;
         merit = start.merit;
-        best = Turned{std::move(attempt), std::move(start)};
+        best = std::move(attempt);
     }
     return best;
 }
@@ -183,8 +221,9 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
         if (progress) progress(stage, share);
     };
     Plan plan(options, flow, parts);
-    if (initial) plan.fits_focal = false;  // it is known, as is a lens that it has
-    if (initial && initial->source.lens.bends()) plan.estimates_lens = false;
+    if (initial) plan.fits_gauge = false;  // it is known, as is a lens that it has
+    if (initial && initial->source.lens.bends() && !options.optimize_lens)
+        plan.estimates_lens = false;
     validate(references, sources, depths, initial, options);
 
     const WorkersOfThread workers(resolve_threads(options.num_threads));
@@ -192,8 +231,9 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
     result.report.frames =
         draw_frames(static_cast<int>(references.size()), options.max_frames, options.seed);
     notify("prepare", 0.0);
-    const auto images = std::make_shared<const WorkingImages>(
-        make_working_images(references, sources, depths, result.report.frames, plan));
+    double still = 0;
+    const auto images = std::make_shared<const WorkingImages>(without_static_edges(
+        make_working_images(references, sources, depths, result.report.frames, plan), still));
     result.report.working_width = images->references[0].width;
     result.report.working_height = images->references[0].height;
 
@@ -207,31 +247,44 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
         solve_adam(
             *attempt.images, attempt.plan,
             [&](double share) { notify("refine", 0.05 + 0.9 * share); }, result.rig, result.report);
-        settle(attempt, result);
+        result.report.lens.tried = options.optimize_lens;
+        result.report.lens.coefficients = attempt.plan.lens_coefficients;
+        settle_refit(attempt, make_level(*attempt.images, 1, result.rig, options.num_threads),
+                     result);
     } else {
         notify("search", 0.05);
-        const Start found =
-            find_start(*attempt.images, references[0], sources[0], attempt.initial, attempt.plan,
-                       [&](double share) { notify("search", 0.05 + 0.55 * share); });
-        search_seconds = found.search_seconds;
         const CalibrationResult empty = result;
-        refine(*attempt.images, found, attempt.plan, notify, result);
-        settle(attempt, result);
-        if (!result.converged && plan.searches && !initial && !options.mount) {
+        const double upright =
+            fit(attempt, references[0], sources[0], notify, search_seconds, result);
+        if (!result.report.verdict.found && plan.searches && !initial && !options.mount) {
             notify("mount", 0.96);
-            if (auto turned = best_turned(images, references[0], sources[0], plan, found)) {
+            if (auto turned = best_turned(images, references[0], sources[0], plan, upright)) {
                 result = empty;
-                refine(*turned->attempt.images, turned->start, turned->attempt.plan, notify,
-                       result);
-                settle(turned->attempt, result);
+                fit(*turned, references[0], sources[0], notify, search_seconds, result);
             }
         }
     }
+    if (still >= 0.001)
+        result.report.message += format(
+            "; what stands still in the reference (%.1f %% of its edges) is left out", 100 * still);
+    if (references[0].channels == 1 && sources[0].channels > 1)
+        result.report.message +=
+            "; the source is in colour and the reference is not: have they been exchanged?";
     notify("judge", 1.0);
     result.report.seconds = seconds_now() - start;
     result.report.time = images->times->seconds(resolve_threads(options.num_threads));
     result.report.time.search = search_seconds;
     return result;
+}
+
+void CalibrationResult::distrust(const std::string& reason, const std::string& advice) {
+    Verdict& verdict = report.verdict;
+    const std::string line = reason + (advice.empty() ? "" : "; " + advice);
+    report.message = verdict.trusted ? line : report.message + "; " + line;
+    verdict.reason = verdict.trusted ? reason : verdict.line() + "; " + reason;
+    verdict.advice = advice;
+    verdict.trusted = report.converged = converged = false;
+    rig.verdict = std::make_shared<const Verdict>(verdict);
 }
 
 CalibrationResult calibrate(const std::vector<ImageView>& references,

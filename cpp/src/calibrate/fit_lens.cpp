@@ -53,9 +53,19 @@ Gain unseen_gain(const Level& level, double share_limit, const Fit& simple, cons
 LensReport fit_lens(const Level& level, double share_limit, double tolerance, const Plan& plan,
                     Rig& rig) {
     LensReport report;
+    const int num_threads = plan.options.num_threads;
+    if (plan.options.optimize_lens) {
+        Plan free = plan;
+        free.lens_coefficients = 2;
+        const double before = pooled(level, rig, num_threads).nec;
+        solve_level(level, {}, 2, share_limit, tolerance, free, rig, rig);
+        report.tried = true;
+        report.coefficients = 2;
+        report.gain = pooled(level, rig, num_threads).nec - before;
+        return report;
+    }
     if (level.pairs.size() < kPairs) return report;
     report.tried = true;
-    const int num_threads = plan.options.num_threads;
 
     // By how many coefficients they have; each is worth looking at where all frames gain.
     std::vector<Fit> fits;

@@ -1,5 +1,5 @@
 // Whether the source has a lens that bends: k1 and k2 beside everything else, kept only where
-// frames gain by them that the fit has not seen.
+// frames gain by them that the fit has not seen, or where they are asked for.
 #pragma once
 
 #include "solve/plan.hpp"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 
 #include "base/parallel.hpp"
 #include "solve/solve.hpp"
@@ -23,13 +22,6 @@ Pinhole camera_guess(const ImageView& image, double hfov) {
 Pinhole with_lens(Pinhole camera, const std::optional<Lens>& lens) {
     if (lens) camera.lens = *lens;
     return camera;
-}
-
-// What candidates are compared by: how well edges agree beyond chance, and over how much of the
-// image. Chance grows as the overlap shrinks. `value`: a NecValue or a LevelReport.
-template <class Value>
-double merit(const Value& value) {
-    return value.aligned * std::sqrt(value.valid_share);
 }
 
 // Where the field of view of the reference makes little difference, it is the paper's 45 deg.
@@ -190,7 +182,6 @@ Rig with_k1(const Rig& rig, double k1) {
 
 // A pinhole hardly finds what a strong lens shows: a few are tried.
 void try_lenses(const Level& level, const Plan& plan, Candidate& candidate) {
-    if (!plan.estimates_lens) return;
     constexpr double kStep = -0.1, kCost = 0.1;
     constexpr int kCount = 5;
     const Rig from = candidate.rig;
@@ -302,9 +293,9 @@ Rig given_start(const ImageView& reference, const ImageView& source,
 Start find_start(const WorkingImages& all_images, const ImageView& reference,
                  const ImageView& source, const std::optional<Rig>& initial, const Plan& plan,
                  const std::function<void(double)>& progress) {
-    constexpr std::size_t kFrames = 8, kFew = 6;
+    constexpr std::size_t kFew = 6;
     const CalibrationOptions& options = plan.options;
-    const WorkingImages images = all_images.spread(kFrames);
+    const WorkingImages images = all_images.spread(kStartFrames);
     const int num_threads = options.num_threads;
     const double start = seconds_now();
     Start out;
@@ -319,7 +310,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         found = {given};
     }
     if (found.empty())
-        throw std::runtime_error("the search found no displacement at which the images overlap");
+        throw NothingFound("the search found no displacement at which the images overlap");
     out.search_seconds = seconds_now() - start;
     progress(0.4);
 
@@ -327,6 +318,8 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
         schedule(images.references[0].width, images.references[0].height, plan.parts);
     const int placing =
         schedule(images.references[0].width, images.references[0].height, {})[0].factor;
+    const bool lens_free = plan.searches && plan.estimates_lens && !options.source_lens &&
+                           !(initial && initial->source.lens.bends());
     const bool focal_free = !initial && !options.reference_camera && !options.reference_hfov_deg &&
                             !options.source_camera;
     // Placing costs hundreds of evaluations: fewer frames are enough.
@@ -370,7 +363,7 @@ Start find_start(const WorkingImages& all_images, const ImageView& reference,
             keep_best(candidates, steps[s].factor > 4 ? 6 : steps[s].factor > 2 ? 4 : 2);
         for (Candidate& candidate : candidates) {
             const Level level = make_level(images, steps[s].factor, candidate.rig, num_threads);
-            if (plan.searches && steps[s].factor >= kCoarse && steps[s].stage == 2)
+            if (lens_free && steps[s].factor >= kCoarse && steps[s].stage == 2)
                 try_lenses(level, plan, candidate);
             candidate.levels.push_back(
                 plan.searches && plan.parts.images

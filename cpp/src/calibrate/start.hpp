@@ -1,8 +1,10 @@
 // Where a calibration starts: the global search, and the choice among what it finds.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "solve/working_images.hpp"
@@ -27,6 +29,17 @@ SearchSpace search_space(const ImageView& reference, const ImageView& source,
                          const std::optional<Rig>& initial, const Plan& plan,
                          double scale_step = kFineScaleStep);
 
+// What candidates are compared by: how well edges agree beyond chance, and over how much of the
+// image. Chance grows as the overlap shrinks. `value`: a NecValue or a LevelReport.
+template <class Value>
+double merit(const Value& value) {
+    return value.aligned * std::sqrt(value.valid_share);
+}
+
+struct NothingFound : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
 struct Start {
     Rig rig;
     std::vector<CandidateReport> candidates;
@@ -40,7 +53,10 @@ struct Start {
 Rig given_start(const ImageView& reference, const ImageView& source,
                 const std::optional<Rig>& initial, const CalibrationOptions& options);
 
-// `reference` and `source` give the sizes of the cameras.
+// Of more frames than these, so many are looked at.
+inline constexpr std::size_t kStartFrames = 8;
+
+// `reference` and `source` give the sizes of the cameras. Throws NothingFound.
 Start find_start(const WorkingImages& images, const ImageView& reference, const ImageView& source,
                  const std::optional<Rig>& initial, const Plan& plan,
                  const std::function<void(double)>& progress);

@@ -2,9 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "base/format.hpp"
+#include "base/median.hpp"
+#include "calibrate/depth_check.hpp"
+#include "calibrate/error_model.hpp"
+#include "calibrate/plausible.hpp"
 #include "calibrate/visible_shift.hpp"
 #include "solve/solve.hpp"
 
@@ -40,73 +47,128 @@ Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
     return out;
 }
 
+std::string today() {
+    const std::time_t now = std::time(nullptr);
+    std::tm parts{};
+    gmtime_r(&now, &parts);
+    char text[16];
+    std::strftime(text, sizeof text, "%Y-%m-%d", &parts);
+    return text;
+}
+
+// Why a rig is not to be trusted, and what to do about it; none where it is.
+std::optional<Objection> objection(const CalibrationReport& report, const WorkingImages& images,
+                                   const Rig& rig, const Halves& halves, const Plan& plan,
+                                   const ErrorModel& model) {
+    constexpr double kContrast = 5.0, kShift = 3.0, kShare = 0.05;
+    constexpr std::size_t kFewFrames = 8;
+    const Verdict& verdict = report.verdict;
+    const bool stands_out = report.contrast >= kContrast;
+    if (images.size() < 2)
+        return Objection{"1 image pair, and nothing to check the rig by",
+                         "calibrate on 2 frames at least, better on 8 or more"};
+    if (report.valid_share < kShare)
+        return Objection{format("the source covers %.0f %% of the reference's edges, expected at "
+                                "least %.0f %%",
+                                100 * report.valid_share, 100 * kShare),
+                         "do both cameras look at the same scene?"};
+    if (!verdict.found && !halves.independent && !stands_out)
+        return Objection{format("edges agree hardly better than displaced ones: NEC stands out by "
+                                "%.1f deviations, expected at least %.0f",
+                                report.contrast, kContrast),
+                         "leave out --search off, or start from a better rig"};
+    if (!verdict.found) {
+        const std::string apart =
+            std::isfinite(report.repeatability_px)
+                ? format("two calibrations of half of the frames each lie %.1f px apart",
+                         report.repeatability_px)
+                : std::string("half of the frames by themselves give no rig at all");
+        if (images.size() < kFewFrames)
+            return Objection{apart, format("%zu frames are few: give 8 or more, of different "
+                                           "scenes",
+                                           images.size())};
+        if (stands_out)
+            return Objection{apart + ", though edges of all frames meet",
+                             "half of the frames show too little, or the scenes repeat themselves: "
+                             "give more, of different scenes"};
+        return Objection{
+            apart + ", and edges of all frames agree hardly better than displaced ones",
+            "do the frames belong together (same moment, same order, not exchanged), "
+            "and do both images show edges?"};
+    }
+    if (auto wrong = wrong_depth(check_depth(images, rig, plan))) return wrong;
+    if (auto implausible = implausible_in(rig, report.near_m, plan, model)) return implausible;
+    if (report.visible_shift_px > kShift)
+        return Objection{format("flow between the registered images still sees a shift of %.1f px, "
+                                "expected at most %.0f",
+                                report.visible_shift_px, kShift),
+                         "does a lens bend the images, or is the depth of other frames?"};
+    const Tolerance& tolerance = plan.options.tolerance;
+    const ExpectedError& expected = verdict.expected_error;
+    if (expected.median > tolerance.median || expected.p95 > tolerance.p95)
+        return Objection{
+            format(
+                "the expected error is %.1f px, 95 %% within %.1f px: more than the tolerance of "
+                "%g and %g px",
+                expected.median, expected.p95, tolerance.median, tolerance.p95),
+            format("give more frames than these %zu, with edges at all depths, or a wider "
+                   "--tolerance",
+                   images.size())};
+    return std::nullopt;
+}
+
 }  // namespace
 
-void judge(const WorkingImages& images, const Rig& rig, const Plan& plan,
-           CalibrationReport& report) {
-    constexpr double kDetail = 0.5, kContrast = 5.0, kRepeatability = 1.0, kShift = 3.0,
-                     kShare = 0.05;
+void judge(const WorkingImages& images, const Level& finest, const Rig& rig, const Halves& halves,
+           const Plan& plan, CalibrationReport& report) {
     const int num_threads = plan.options.num_threads;
-    const Level level = make_level(images, kFactor, rig, num_threads);
+    // Where halves were found apart, contrast only helps to say why they disagree.
+    constexpr std::size_t kFrames = 4;
+    const Level level =
+        make_level(halves.independent ? images.spread(kFrames) : images, kFactor, rig, num_threads);
     const double here = pooled(level, rig, num_threads).nec;
     const Baseline baseline = displaced(level, rig, num_threads);
     report.baseline_nec = baseline.mean;
     report.contrast = baseline.deviation > 0 ? (here - baseline.mean) / baseline.deviation : 0.0;
-
-    const std::size_t pairs = images.size();
-    report.repeatability_px = INFINITY;
-    if (pairs >= 2) {
-        Plan quick = plan;  // they start where all frames agree
-        quick.options.max_iterations = std::min(plan.options.max_iterations, 12);
-        Rig halves[2] = {rig, rig};
-        for (std::size_t k = 0; k < 2; ++k)
-            solve_level(fold_of(level, 2, k, true), {}, 2, share_limit(report.valid_share), 1e-5,
-                        quick, rig, halves[k]);
-        report.repeatability_px = median_distance(level, halves[0], halves[1]);
-    }
-
+    report.repeatability_px = distance(halves, images);
     report.visible_shift_px = visible_shift(images, rig, num_threads);
 
-    // Where the fit is some pixels off, coarse edges still meet and fine ones do not.
-    const double coarse =
-        pooled(make_nec_level(images, kCoarse, rig, num_threads), rig, num_threads).aligned;
-    const double fine = report.levels.back().aligned;
-
-    report.converged = false;
-    if (pairs < 2) report.message = "1 image pair is too few to trust, expected at least 2";
-    else if (report.valid_share < kShare)
-        report.message = format(
-            "the source covers %.0f %% of the reference's edges, expected at "
-            "least %.0f %%",
-            100 * report.valid_share, 100 * kShare);
-    else if (report.contrast < kContrast)
-        report.message = format(
-            "edges agree hardly better than displaced ones: NEC stands out by "
-            "%.1f deviations, expected at least %.0f",
-            report.contrast, kContrast);
-    else if (fine < kDetail * coarse)
-        report.message = format(
-            "only coarse edges agree: beyond chance %.3f at 1/%d of the size and %.3f at full "
-            "size, "
-            "expected at least %.3f",
-            coarse, kCoarse, fine, kDetail * coarse);
-    else if (report.repeatability_px > kRepeatability)
-        report.message = format(
-            "two halves of the frames disagree by %.2f px, expected at most "
-            "%.1f",
-            report.repeatability_px, kRepeatability);
-    else if (report.visible_shift_px > kShift)
-        report.message = format(
-            "flow between the registered images still sees a shift of %.1f px, expected at most "
-            "%.0f",
-            report.visible_shift_px, kShift);
-    else {
-        report.converged = true;
-        report.message = format(
-            "NEC stands out by %.1f deviations, two halves of the frames agree "
-            "to %.2f px",
-            report.contrast, report.repeatability_px);
+    std::vector<float> depths;
+    for (const Image& depth : images.pyramid.at(8).depths)
+        for (const float z : depth.pixels)
+            if (z > 0) depths.push_back(z);
+    if (!depths.empty()) {
+        report.near_m = quantile(depths, 0.05);
+        report.middle_m = quantile(depths, 0.5);
+        report.far_m = quantile(depths, 0.95);
     }
+
+    Verdict& verdict = report.verdict;
+    verdict.frames = static_cast<int>(images.size());
+    verdict.date = today();
+    verdict.software = "xcalib " XCALIB_VERSION;
+    verdict.found = agree(halves, images) && (halves.independent || report.contrast >= 5.0);
+    report.errors = std::make_shared<const ErrorModel>(images, finest, rig, halves, plan);
+    const ErrorModel& model = *report.errors;
+    report.weak_directions = model.weak_directions();
+    verdict.expected_error = model.over_footage();
+    verdict.by_depth.clear();
+    if (!plan.options.relative_depth)
+        for (const double depth :
+             {2.0, 3.0, 5.0, 10.0, 20.0, 50.0, std::numeric_limits<double>::infinity()})
+            verdict.by_depth.push_back({depth, model.at(1 / depth)});
+
+    const std::optional<Objection> against = objection(report, images, rig, halves, plan, model);
+    verdict.trusted = !against;
+    verdict.reason = against ? against->reason
+                             : format(
+                                   "expected error %.2f px, 95 %% within %.2f px; two halves of "
+                                   "the frames agree to %.2f px",
+                                   verdict.expected_error.median, verdict.expected_error.p95,
+                                   report.repeatability_px);
+    verdict.advice = against ? against->advice : "";
+    report.converged = verdict.trusted;
+    report.message = verdict.line();
 }
 
 }  // namespace xcalib

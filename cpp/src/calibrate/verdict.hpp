@@ -1,14 +1,15 @@
 // Is a calibration to be trusted? Judged from the footage alone.
 #pragma once
 
+#include "calibrate/halves.hpp"
 #include "solve/working_images.hpp"
 #include "xcalib/calibration_report.hpp"
 
 namespace xcalib {
 
-// Fills converged, message, baseline_nec, contrast, repeatability_px and visible_shift_px of the
-// report.
-void judge(const WorkingImages& images, const Rig& rig, const Plan& plan,
-           CalibrationReport& report);
+// `finest`: the level that `rig` was solved at last. Fills verdict, converged, message,
+// baseline_nec, contrast, repeatability_px and visible_shift_px of the report.
+void judge(const WorkingImages& images, const Level& finest, const Rig& rig, const Halves& halves,
+           const Plan& plan, CalibrationReport& report);
 
 }  // namespace xcalib

@@ -44,19 +44,6 @@ struct Row {
     }
 };
 
-// 1 / value, to the last bit or so, else to 1e-4.
-template <bool exact>
-HWY_INLINE Float reciprocal(Float value) {
-#if XCALIB_X86_LANES                               // where a division is slow
-    Float out = hn::ApproximateReciprocal(value);  // to 12 or, with 16 lanes, 14 bits
-    constexpr int steps = (exact ? 1 : 0) + (HWY_TARGET == HWY_AVX2 ? 1 : 0);
-    for (int i = 0; i < steps; ++i) out = hn::MulAdd(out, hn::NegMulAdd(value, out, set(1.0)), out);
-    return out;
-#else
-    return hn::Div(set(1.0), value);
-#endif
-}
-
 // Eq. (3d_mapping) times the depth, before the division.
 struct Homogeneous {
     Float u, v, z;

@@ -24,6 +24,28 @@ std::string camera_text(const char* name, const Pinhole& c) {
         c.skew, c.lens.bends() ? (", lens " + Lens::word(c.lens)).c_str() : "");
 }
 
+std::string error_text(const ExpectedError& error) {
+    return format("%.2f px, 95 %% within %.2f px", error.median, error.p95);
+}
+
+std::string distance_text(double depth) {
+    return std::isinf(depth) ? "infinity" : format("%g m", depth);
+}
+
+// What its calibration says of itself.
+std::string verdict_text(const Verdict& verdict) {
+    std::string text = std::string("\n") + (verdict.trusted ? "trusted    " : "NOT TRUSTED ") +
+                       verdict.line() + "\n";
+    text += format("calibrated on %d frames, %s, by %s\n", verdict.frames, verdict.date.c_str(),
+                   verdict.software.c_str());
+    text += "expected error (px of the reference at 640 px of width): half of the pixels within " +
+            error_text(verdict.expected_error) + ", over the footage's depths";
+    for (const ErrorAtDepth& row : verdict.by_depth)
+        text +=
+            format("\n  %8s: %s", distance_text(row.depth).c_str(), error_text(row.error).c_str());
+    return text;
+}
+
 }  // namespace
 
 RigFacts describe(const Rig& rig) {
@@ -66,10 +88,12 @@ std::string facts_text(const Rig& rig) {
     text += format("baseline   %.4f m\n", facts.baseline);
     text += "the reference image's centre in the source image:";
     for (const RigFacts::Centre& row : facts.centre) {
-        const std::string distance = row.depth ? format("%g m", *row.depth) : "infinity";
+        const std::string distance =
+            distance_text(row.depth.value_or(std::numeric_limits<double>::infinity()));
         text += format("\n  %8s: (%8.2f, %8.2f) px, parallax %6.2f px", distance.c_str(),
                        row.point.x(), row.point.y(), row.parallax);
     }
+    if (rig.verdict) text += verdict_text(*rig.verdict);
     return text;
 }
 

@@ -69,6 +69,12 @@ Json json_of(const Pinhole& camera) {
     return out;
 }
 
+Json json_of(const ExpectedError& error) { return {{"median", error.median}, {"p95", error.p95}}; }
+
+Json json_of(const ErrorAtDepth& row) {
+    return {{"depth_m", row.depth}, {"median", row.error.median}, {"p95", row.error.p95}};
+}
+
 template <class Value>
 Json list_of(const std::vector<Value>& values) {
     Json list = Json::array();
@@ -102,14 +108,38 @@ Json json_of(const LagReport& lag) {
     return {{"frames", lag.frames}, {"change", lag.change}, {"fits", fits}};
 }
 
+Json json_of(const RunFacts& run) {
+    Json choice = Json::array();
+    for (const RunFacts::Frame& frame : run.choice)
+        choice.push_back({{"file", frame.file}, {"taken", frame.taken}, {"reason", frame.reason}});
+    return {{"program", run.program},
+            {"arguments", run.arguments},
+            {"directory", run.directory},
+            {"lag", run.lag},
+            {"choice", choice}};
+}
+
 std::string text_of(const Json& document) {
     return document.dump(2, ' ', true, Json::error_handler_t::replace);
+}
+
+Json json_of(const Verdict& verdict) {
+    return {{"trusted", verdict.trusted},
+            {"found", verdict.found},
+            {"reason", verdict.reason},
+            {"advice", verdict.advice},
+            {"expected_error_px", json_of(verdict.expected_error)},
+            {"error_by_depth", list_of(verdict.by_depth)},
+            {"frames", verdict.frames},
+            {"date", verdict.date},
+            {"software", verdict.software}};
 }
 
 }  // namespace
 
 Json json_of(const CalibrationReport& report) {
-    return {{"converged", report.converged},
+    return {{"verdict", json_of(report.verdict)},
+            {"converged", report.converged},
             {"message", report.message},
             {"seconds", report.seconds},
             {"time", json_of(report.time)},
@@ -121,6 +151,10 @@ Json json_of(const CalibrationReport& report) {
             {"repeatability_px", report.repeatability_px},
             {"visible_shift_px", report.visible_shift_px},
             {"valid_share", report.valid_share},
+            {"near_m", report.near_m},
+            {"middle_m", report.middle_m},
+            {"far_m", report.far_m},
+            {"weak_directions", report.weak_directions},
             {"frames", report.frames},
             {"candidates", list_of(report.candidates)},
             {"levels", list_of(report.levels)},
@@ -172,12 +206,17 @@ Json json_of(const Rig& rig) {
             {"translation_m", numbers_of(rig.t())},
             {"position_m", numbers_of(facts.position)},
             {"baseline_m", facts.baseline},
-            {"centre", centre}};
+            {"centre", centre},
+            {"verdict", rig.verdict ? json_of(*rig.verdict) : Json()}};
 }
 
 std::string report_document(const CalibrationReport& report, const std::string& rig_file,
-                            const std::vector<std::string>& files) {
-    Json document{{"format", "xcalib-report"}, {"version", 1}, {"rig", rig_file}, {"files", files}};
+                            const std::vector<std::string>& files, const RunFacts& run) {
+    Json document{{"format", "xcalib-report"},
+                  {"version", 1},
+                  {"rig", rig_file},
+                  {"files", files},
+                  {"run", json_of(run)}};
     document.update(json_of(report));
     return text_of(document) + "\n";
 }

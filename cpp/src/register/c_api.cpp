@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "xcalib/register.hpp"
+#include "xcalib/transfer.hpp"
 
 static_assert(XCALIB_U8 == static_cast<int>(xcalib::PixelType::u8) &&
               XCALIB_U16 == static_cast<int>(xcalib::PixelType::u16) &&
@@ -20,6 +21,11 @@ static_assert(XCALIB_VALID == static_cast<int>(xcalib::Validity::valid) &&
               XCALIB_OUTSIDE == static_cast<int>(xcalib::Validity::outside) &&
               XCALIB_OCCLUDED == static_cast<int>(xcalib::Validity::occluded) &&
               XCALIB_NO_DEPTH == static_cast<int>(xcalib::Validity::no_depth));
+static_assert(XCALIB_VALID == static_cast<int>(xcalib::Transferred::valid) &&
+              XCALIB_OUTSIDE == static_cast<int>(xcalib::Transferred::outside) &&
+              XCALIB_OCCLUDED == static_cast<int>(xcalib::Transferred::occluded) &&
+              XCALIB_NO_DEPTH == static_cast<int>(xcalib::Transferred::no_depth) &&
+              XCALIB_AMBIGUOUS == static_cast<int>(xcalib::Transferred::ambiguous));
 
 struct xcalib_registrar {
     xcalib::Registrar registrar;
@@ -186,4 +192,39 @@ xcalib_status xcalib_map(const xcalib_registrar* registrar, const xcalib_image* 
         require_given(map, "map");
         registrar->registrar.map(view_of<ImageView>(depth, "depth"), map);
     });
+}
+
+namespace {
+
+using OneWay = xcalib::TransferredPoint (xcalib::FrameTransfer::*)(const Eigen::Vector2d&) const;
+
+xcalib_status transferred(OneWay way, const xcalib_rig* rig, const xcalib_image* depth,
+                          const double* points, size_t count, double* out, uint8_t* codes) {
+    using namespace xcalib;
+    return guarded([&] {
+        require_given(rig, "rig");
+        require_given(points, "points");
+        require_given(out, "out");
+        require_given(codes, "codes");
+        const FrameTransfer frame(rig_of(*rig), view_of<ImageView>(depth, "depth"));
+        for (size_t i = 0; i < count; ++i) {
+            const TransferredPoint p = (frame.*way)({points[2 * i], points[2 * i + 1]});
+            out[2 * i] = p.point.x();
+            out[2 * i + 1] = p.point.y();
+            codes[i] = static_cast<uint8_t>(p.code);
+        }
+    });
+}
+
+}  // namespace
+
+xcalib_status xcalib_transfer(const xcalib_rig* rig, const xcalib_image* depth,
+                              const double* points, size_t count, double* out, uint8_t* codes) {
+    return transferred(&xcalib::FrameTransfer::to_source, rig, depth, points, count, out, codes);
+}
+
+xcalib_status xcalib_transfer_back(const xcalib_rig* rig, const xcalib_image* depth,
+                                   const double* points, size_t count, double* out,
+                                   uint8_t* codes) {
+    return transferred(&xcalib::FrameTransfer::to_reference, rig, depth, points, count, out, codes);
 }

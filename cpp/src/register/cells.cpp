@@ -41,6 +41,12 @@ Eigen::Vector2d steps_of(const Rig& rig) {
     return steps;
 }
 
+// Epipolar lines that are steeper are no longer nearly along rows.
+constexpr double kMaxSlope = 0.25;
+constexpr int kMaxRowCells = 1 << 16;
+// Nothing is expected to be nearer than so many baselines: its shadow may be cut short.
+constexpr double kNearest = 12;
+
 }  // namespace
 
 CellGrid::CellGrid(const Rig& rig) {
@@ -62,6 +68,87 @@ CellGrid::CellGrid(const Rig& rig) {
     along_x = cells_x * std::abs(rig.t().x()) >= cells_y * std::abs(rig.t().y());
     absolute_tolerance =
         static_cast<float>(kMinShift / (std::max(cells_x, cells_y) * rig.t().norm()));
+}
+
+RowGrid::RowGrid(const Rig& rig) : height_(rig.reference.height) {
+    constexpr double kFar = 1e6;  // [m]
+    const double near = 2 * kNearest * rig.t().norm();
+    double step = 0, direction = 0, back = 0;
+    for (int i = 0; i <= kBands; ++i)
+        for (int k = 0; k <= kBands; ++k) {
+            const double x = (rig.reference.width - 1.0) * k / kBands;
+            const double y = (height_ - 1.0) * i / kBands;
+            const Eigen::Vector2d here = transfer(rig, x, y, kFar);
+            const bool visible = here.x() >= 0 && here.y() >= 0 &&
+                                 here.x() <= rig.source.width - 1 &&
+                                 here.y() <= rig.source.height - 1;
+            Eigen::Matrix2d slope;
+            slope.col(0) = transfer(rig, x + 0.5, y, kFar) - transfer(rig, x - 0.5, y, kFar);
+            slope.col(1) = transfer(rig, x, y + 0.5, kFar) - transfer(rig, x, y - 0.5, kFar);
+            // In the reference, something so near lies this far from what it hides.
+            const Eigen::Vector2d moved =
+                slope.inverse() * (transfer(rig, x, y, near) - here).eval();
+            if (!visible || !slope.allFinite() || !moved.allFinite()) continue;
+            const double along = slope.col(0).cwiseAbs().maxCoeff();
+            if (step == 0) {
+                along_u = along == std::abs(slope(0, 0));
+                direction = slope(along_u ? 0 : 1, 0);
+                back = moved.x();
+            }
+            if (slope(along_u ? 0 : 1, 0) * direction <= 0 ||
+                2 * std::abs(slope(along_u ? 0 : 1, 0)) < slope.col(0).norm() ||
+                moved.x() * back <= 0 || std::abs(moved.y()) > kMaxSlope * std::abs(moved.x()))
+                return;
+            step = std::max(step, along);
+            const double depth = (rig.R() * unproject(rig.reference, x, y, near) + rig.t()).z();
+            fall_[i][k] = static_cast<float>(moved.y() * depth);
+        }
+    const double size = along_u ? rig.source.width : rig.source.height;
+    if (step == 0 || size / step > kMaxRowCells) return;
+    // Where pixels are farthest apart in the source they are a cell apart.
+    per_pixel = static_cast<float>((direction > 0 ? 1 : -1) / step);
+    shift = static_cast<float>(kBefore + 1 + (direction > 0 ? 0 : (size - 1) / step));
+    count = kBefore + static_cast<int>(size / step) + 4;
+    near_lies_back = back < 0;
+    farthest_ = static_cast<float>(2 / near);
+    // Where shadows fall both ways, those that fall the other way are not found.
+    constexpr float kMaxOther = 2;  // [rows]
+    for (int y = 0; y < height_; y += rows_at_a_time()) {
+        const Shadows of_rows = shadows(y, std::min(height_, y + rows_at_a_time()));
+        for (const float fall : of_rows.shortest)
+            if (fall * farthest_ < -kMaxOther) return;
+    }
+    serves = true;
+}
+
+int RowGrid::rows_at_a_time() const { return std::max(64, height_ / 8); }
+
+Shadows RowGrid::shadows(int begin, int end) const {
+    const double rows = std::max(1, height_ - 1);
+    const int first = static_cast<int>(std::floor(kBands * begin / rows));
+    const int last = std::min(kBands, static_cast<int>(std::ceil(kBands * (end - 1) / rows)));
+    Shadows out;
+    float least = 0, most = 0;
+    for (int i = first; i <= last; ++i)
+        for (const float fall : fall_[i]) {
+            least = std::min(least, fall);
+            most = std::max(most, fall);
+        }
+    out.down = most >= -least;
+    out.longest_of_all = std::max(most, -least);
+    for (int k = 0; k < kBands; ++k) {
+        out.shortest[k] = out.longest_of_all;
+        out.longest[k] = -out.longest_of_all;
+        for (int i = first; i <= last; ++i)
+            for (const float fall : {fall_[i][k], fall_[i][k + 1]}) {
+                const float as_counted = out.down ? fall : -fall;
+                out.shortest[k] = std::min(out.shortest[k], as_counted);
+                out.longest[k] = std::max(out.longest[k], as_counted);
+            }
+    }
+    const double reach = std::ceil(out.longest_of_all * farthest_);
+    out.reach = std::min(static_cast<int>(reach), kMaxReach);
+    return out;
 }
 
 }  // namespace xcalib

@@ -32,6 +32,15 @@ HWY_INLINE int first_of(Vectors vectors) {
     return static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(vectors));
 }
 
+// A bit for each lane.
+HWY_INLINE Vectors bits(Mask mask) {
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(FloatTag(), mask, bytes);
+    Vectors out;
+    std::memcpy(&out, bytes, sizeof out);
+    return out;
+}
+
 // A number plus kLarge is rounded to a whole one, of which the bits less kLargeBits are the
 // integer. Holds up to 4 million, and is cheaper than a conversion, which has to look out for
 // overflow.
@@ -86,17 +95,21 @@ HWY_INLINE Located locate(const AnyRow& row, Float depth, Float x, int column) {
     return row.bends ? locate(row.bent, depth, column) : locate(row.straight, depth, x);
 }
 
-// A row of the caller's depth.
+// A row of depth: the caller's as it is, or one made of it.
 struct DepthRow {
     const char* data;
     std::ptrdiff_t stride;  // [bytes] to the next
     int bytes;              // a pixel's
     Float scale;
 
-    HWY_INLINE DepthRow(const DepthView& depth, int y)
-        : data(depth.view.row<char>(y)), stride(depth.view.row_bytes),
-          bytes(depth.view.type == PixelType::u16 ? 2 : 4),
-          scale(hn::Set(FloatTag(), depth.scale)) {}
+    HWY_INLINE DepthRow(const DepthRows& rows, int y, DepthRows::Room& room) {
+        const DepthView& depth = rows.given();
+        const bool given = !rows.resizes();
+        data = given ? depth.view.row<char>(y) : reinterpret_cast<const char*>(rows.row(y, room));
+        stride = given ? depth.view.row_bytes : 0;
+        bytes = given && depth.view.type == PixelType::u16 ? 2 : 4;
+        scale = hn::Set(FloatTag(), depth.scale);
+    }
 
     // From pixel x on, of which a vector is there.
     HWY_INLINE Float load(int x) const {
@@ -122,6 +135,22 @@ struct DepthRow {
         return hn::Mul(scale, hn::ConvertTo(FloatTag(), hn::PromoteTo(IntTag(), units)));
     }
 };
+
+#if HWY_TARGET != HWY_SCALAR
+// What is nearest in the cells of a window of 2 kLanes and in those so many behind, at `index`: the
+// upper half of a float.
+HWY_INLINE Int nearest_in_window(const Nearness* from, int step, Int index) {
+    const IntTag di;
+    const hn::Repartition<Nearness, IntTag> pairs;
+    const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + step));
+    const Int both = hn::TableLookupLanes(
+        hn::BitCast(di, nearest),
+        hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
+    return hn::IfThenElse(hn::TestBit(index, set(1)),
+                          hn::And(both, set(static_cast<int>(0xffff0000))),
+                          hn::ShiftLeft<16>(both));
+}
+#endif
 
 // The cell of points within the source, or on its rim.
 HWY_INLINE Int cells_of(const CellGrid& grid, Float x, Float y) {

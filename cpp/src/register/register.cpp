@@ -33,16 +33,6 @@ void require_size(const char* name, int width, int height, const Pinhole& camera
     throw std::invalid_argument(message.str());
 }
 
-Image in_metres(const DepthView& depth) {
-    if (depth.view.type == PixelType::f32) return clean_depth(depth.view);
-    Image out(depth.view.width, depth.view.height);
-    for (int y = 0; y < out.height; ++y) {
-        const std::uint16_t* units = depth.view.row<std::uint16_t>(y);
-        for (int x = 0; x < out.width; ++x) out.row(y)[x] = depth.scale * units[x];
-    }
-    return out;
-}
-
 // Where the source has no number, or is made of one that is none, it has no value: as outside of
 // it.
 void drop_not_finite(const MutableImageView& image, int begin, int end, std::uint8_t* mask) {
@@ -84,75 +74,107 @@ void RegistrarOptions::validate() const {
 }
 
 struct Registrar::Stream {
-    // The cells of the parts one after the other, then those of all.
-    using Cells = std::vector<Nearness>;
+    // What a frame needs besides: one for each call that there was at a time.
+    struct Scratch {
+        // Those of the parts one after the other, then those of all.
+        std::vector<Nearness> cells;
+        DepthRows depth;
+        std::vector<DepthRows::Room> rooms;  // one a thread
+        std::vector<HiddenRoom> hidden;      // also one a thread
+    };
 
     Rig rig;
     RegistrarOptions options;
     Projector projector;
     CellGrid grid;
+    int threads;
     int parts;
     bool occlusion;
+    RowGrid row_grid;
     Workers workers;
     std::mutex mutex;
-    std::vector<std::unique_ptr<Cells>> spare;  // one for each call that there was at a time
+    std::vector<std::unique_ptr<Scratch>> spare;
 
     Stream(const Rig& for_rig, const RegistrarOptions& with)
         : rig(for_rig), options(with), projector(rig), grid(rig),
-          parts(std::min(resolve_threads(options.num_threads), kMaxParts)),
+          threads(resolve_threads(options.num_threads)), parts(std::min(threads, kMaxParts)),
           // Cameras at one place see the same.
           occlusion(options.occlusion != Occlusion::ignore && rig.t().norm() > 0),
-          workers(resolve_threads(options.num_threads)) {
-        if (occlusion) give_back(take());  // for the first frame
+          row_grid(occlusion ? RowGrid(rig) : RowGrid()), workers(threads) {
+        give_back(take());  // for the first frame
     }
 
-    std::unique_ptr<Cells> take() {
+    std::unique_ptr<Scratch> take() {
         {
             const std::lock_guard lock(mutex);
             if (!spare.empty()) {
-                std::unique_ptr<Cells> cells = std::move(spare.back());
+                std::unique_ptr<Scratch> scratch = std::move(spare.back());
                 spare.pop_back();
-                return cells;
+                return scratch;
             }
         }
-        return std::make_unique<Cells>((parts + 1) * cells_with_room(grid));
+        auto scratch = std::make_unique<Scratch>();
+        scratch->rooms.resize(threads);
+        scratch->hidden.resize(threads);
+        if (!occlusion) return scratch;
+        if (!row_grid.serves) scratch->cells.resize((parts + 1) * cells_with_room(grid));
+        else
+            for (HiddenRoom& room : scratch->hidden) room.keep(rig.reference.width, row_grid);
+        return scratch;
     }
 
-    void give_back(std::unique_ptr<Cells> cells) {
+    void give_back(std::unique_ptr<Scratch> scratch) {
         const std::lock_guard lock(mutex);
-        spare.push_back(std::move(cells));
+        spare.push_back(std::move(scratch));
     }
 
-    // Splats all of the depth, then calls work(cells, begin, end) on all rows of the reference.
-    // `cells` is null where nothing can be hidden, or nobody asks.
+    // Calls work(part, begin, end) on all of so many rows, a thread a part, some at a time.
     template <class Work>
-    void each_row(const DepthView& depth, bool asked, const Work& work) {
-        std::unique_ptr<Cells> cells;
-        const Nearness* joined = nullptr;
-        const int height = depth.view.height;
-        const auto in_rows = [&](int rows, const auto& work_on) {
-            workers.each((rows + kRows - 1) / kRows, [&](int part) {
-                work_on(part * kRows, std::min(rows, (part + 1) * kRows));
-            });
-        };
-        if (occlusion && asked) {
-            cells = take();
+    void share_out(int num_parts, int rows, int at_a_time, const Work& work) {
+        std::atomic<int> next{0};
+        workers.each(num_parts, [&](int part) {
+            for (int y = next.fetch_add(at_a_time); y < rows; y = next.fetch_add(at_a_time))
+                work(part, y, std::min(rows, y + at_a_time));
+        });
+    }
+
+    // Calls work(task, begin, end) on all rows of the reference, with what is the same for all of
+    // them in `task`: the means to tell what is hidden too, where something can be, and it is
+    // `asked` for. If these are a grid of cells, all of the depth is splat first.
+    template <class Work>
+    void each_row(RowsTask task, const DepthView& depth, bool asked, const Work& work) {
+        const int height = rig.reference.height;
+        std::unique_ptr<Scratch> scratch = take();
+        DepthRows& rows = scratch->depth;
+        rows.set(depth, rig.reference.width, height);
+        for (DepthRows::Room& room : scratch->rooms) rows.prepare(room);
+        if (occlusion && asked && row_grid.serves) task.row_grid = &row_grid;
+        else if (occlusion && asked) {
+            Nearness* cells = scratch->cells.data();
             const std::size_t size = cells_with_room(grid);
-            std::atomic<int> next{0};
-            workers.each(parts, [&](int part) {
-                Nearness* own = cells->data() + part * size;
-                std::fill_n(own, size, Nearness{0});
-                for (int y = next.fetch_add(kRows); y < height; y = next.fetch_add(kRows))
-                    splat_rows(projector, depth, grid, y, std::min(height, y + kRows), own);
+            workers.each(parts,
+                         [&](int part) { std::fill_n(cells + part * size, size, Nearness{0}); });
+            share_out(parts, height, kRows, [&](int part, int begin, int end) {
+                splat_rows(projector, rows, scratch->rooms[part], grid, begin, end,
+                           cells + part * size);
             });
-            Nearness* out = cells->data() + parts * size;
-            in_rows(grid.height, [&](int begin, int end) {
-                join_cells(grid, cells->data(), parts, begin, end, out);
+            share_out(threads, grid.height, kRows, [&](int, int begin, int end) {
+                join_cells(grid, cells, parts, begin, end, cells + parts * size);
             });
-            joined = out;
+            task.cells = cells + parts * size;
         }
-        in_rows(height, [&](int begin, int end) { work(joined, begin, end); });
-        if (cells) give_back(std::move(cells));
+        task.projector = &projector;
+        task.depth = &rows;
+        task.grid = &grid;
+        task.hide = options.occlusion == Occlusion::hide;
+        const int at_a_time = task.row_grid ? row_grid.rows_at_a_time() : kRows;
+        share_out(threads, height, at_a_time, [&](int part, int begin, int end) {
+            RowsTask of_thread = task;
+            of_thread.room = &scratch->rooms[part];
+            of_thread.hidden = &scratch->hidden[part];
+            work(of_thread, begin, end);
+        });
+        give_back(std::move(scratch));
     }
 };
 
@@ -179,33 +201,23 @@ const RegistrarOptions& Registrar::options() const { return stream_->options; }
 
 namespace {
 
-// The depth on the reference's grid: as given where it has that size, else resized into `room`.
-DepthView on_grid(const ImageView& depth, double scale, const Pinhole& grid, Image& room) {
+DepthView checked(const ImageView& depth, double scale, const Pinhole& grid) {
     require_same_aspect("depth", depth.width, depth.height, grid.width, grid.height);
     const bool metres = depth.type == PixelType::f32;
     const bool units = depth.type == PixelType::u16 && scale > 0;
     if (depth.channels != 1 || !(metres || units))
         throw std::invalid_argument(
             "depth must be one float32 channel in metres, or uint16 with depth_scale given");
-    const DepthView given{depth, metres ? 1.0f : static_cast<float>(scale)};
-    if (depth.width == grid.width && depth.height == grid.height) return given;
-    room = resize_depth(in_metres(given), grid.width, grid.height);
-    return {room.view(), 1.0f};
+    return {depth, metres ? 1.0f : static_cast<float>(scale)};
 }
 
 }  // namespace
 
 void Registrar::map(const ImageView& depth, float* out) const {
-    Image room;
-    RowsTask task{};
-    task.projector = &stream_->projector;
-    task.depth = on_grid(depth, options().depth_scale, rig().reference, room);
-    task.grid = &stream_->grid;
-    task.hide = options().occlusion == Occlusion::hide;
-    stream_->each_row(task.depth, task.hide, [&](const Nearness* cells, int begin, int end) {
-        RowsTask part = task;
-        part.cells = cells;
-        map_rows(part, begin, end, out);
+    const DepthView given = checked(depth, options().depth_scale, rig().reference);
+    const bool asked = options().occlusion == Occlusion::hide;
+    stream_->each_row({}, given, asked, [&](const RowsTask& task, int begin, int end) {
+        map_rows(task, begin, end, out);
     });
 }
 
@@ -217,19 +229,13 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
         throw std::invalid_argument("registered must have the source's pixel type and channels");
     if (std::abs(source.row_bytes) > std::numeric_limits<std::int32_t>::max() / source.height)
         throw std::invalid_argument("source takes more than 2 GiB, expected less");
-    Image room;
     RowsTask task{};
-    task.projector = &stream_->projector;
-    task.depth = on_grid(depth, options().depth_scale, rig().reference, room);
-    task.grid = &stream_->grid;
-    task.hide = options().occlusion == Occlusion::hide;
     task.source = source;
     task.nearest = options().nearest;
     task.registered = registered;
     task.mask = mask;
-    stream_->each_row(task.depth, true, [&](const Nearness* cells, int begin, int end) {
-        RowsTask part = task;
-        part.cells = cells;
+    const DepthView given = checked(depth, options().depth_scale, rig().reference);
+    stream_->each_row(task, given, true, [&](const RowsTask& part, int begin, int end) {
         register_rows(part, begin, end);
         if (source.type == PixelType::f32) drop_not_finite(registered, begin, end, mask);
     });

@@ -18,20 +18,64 @@ namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
 
+// Where the pixels of a row lie that is looked at a vector at a time.
+struct SlowRow {
+    const RowsTask& task;
+    const AnyRow& row;
+    const DepthRow& depths;
+    const HiddenRow& hidden;
+
+    HWY_INLINE Float depth(int x) const { return depths.load(x, task.depth->width() - x); }
+    HWY_INLINE static Float along(int x) {
+        return hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
+    }
+    HWY_INLINE Located locate(int x) const {
+        return HWY_NAMESPACE::locate(row, depth(x), along(x), x);
+    }
+    // Of valid ones those that something hides.
+    HWY_INLINE Mask gone(int x, const Points& p, Mask valid) const {
+        if (task.cells) return hn::And(valid, HWY_NAMESPACE::hidden(*task.grid, task.cells, p));
+        if (hidden.may_be_hidden(x)) return hn::And(valid, hidden.hidden(x));
+        return hn::MaskFromVec(hn::Zero(FloatTag()));
+    }
+};
+
+// The rows [begin, end) in the order in which shadows fall, after those that they fall from.
+struct RowOrder {
+    Shadows shadows;
+    int first, count, before;
+
+    HWY_INLINE RowOrder(const RowsTask& task, int begin, int end) : count(end - begin) {
+        if (task.row_grid) shadows = task.row_grid->shadows(begin, end);
+        first = shadows.down ? begin : end - 1;
+        const int most = shadows.down ? begin : task.depth->height() - end;
+        before = std::min(shadows.reach, most);
+    }
+    HWY_INLINE int row(int i) const { return shadows.down ? first + i : first - i; }
+};
+
+// Puts the pixels of a row from x on.
+HWY_INLINE void put(const SlowRow& row, HiddenRow& hidden, int x) {
+    for (; x < row.task.depth->width(); x += kLanes) {
+        const Points p = row.locate(x).points();
+        hidden.put(x, p, in_front(row.depth(x), p), row.along(x));
+    }
+}
+
 // Any vector of pixels.
 template <class T, int kChannels>
-HWY_INLINE void sample(const RowsTask& task, const Source& source, const AnyRow& row, Float depth,
-                       Float x, int column, T* out, std::uint8_t* mask) {
+HWY_INLINE void sample(const SlowRow& row, const Source& source, int x, T* out,
+                       std::uint8_t* mask) {
     const IntTag di;
-    const Located at = locate(row, depth, x, column);
+    const RowsTask& task = row.task;
+    const Float depth = row.depth(x);
+    const Located at = row.locate(x);
     Points p = at.points();
     Mask valid = confine(*task.projector, depth, p);
     Int codes = codes_of(depth, valid);
-    if (task.cells) {
-        const Mask gone = hn::And(valid, hidden(*task.grid, task.cells, p));
-        codes = hn::IfThenElse(hn::RebindMask(di, gone), code_of(Validity::occluded), codes);
-        if (task.hide) valid = hn::AndNot(gone, valid);
-    }
+    const Mask gone = row.gone(x, p, valid);
+    codes = hn::IfThenElse(hn::RebindMask(di, gone), code_of(Validity::occluded), codes);
+    if (task.hide) valid = hn::AndNot(gone, valid);
     store_codes(codes, mask);
     if (hn::AllFalse(FloatTag(), valid)) std::fill_n(out, kLanes * kChannels, T{0});
     else if (task.nearest) sample_nearest<T, kChannels>(source, p, valid, out);
@@ -40,47 +84,47 @@ HWY_INLINE void sample(const RowsTask& task, const Source& source, const AnyRow&
 
 template <class T, int kChannels>
 void register_rows_of(const RowsTask& task, int begin, int end) {
-    const int width = task.depth.view.width;
+    const int width = task.depth->width();
     const Source source(task.source);
     T pixels[kLanes * kChannels];  // of the last, incomplete vector of a row
     std::uint8_t codes[kLanes];
-#if HWY_TARGET != HWY_SCALAR
-    Stretch stretch;
-#endif
-    for (int y = begin; y < end; ++y) {
-#if HWY_TARGET != HWY_SCALAR
-        const Reach reach = reach_of<T>(source, task.projector->step_along_row(width / 2, y));
-#endif
+    const RowOrder order(task, begin, end);
+    for (int i = -order.before; i < order.count; ++i) {
+        const int y = order.row(i);
         const AnyRow row(*task.projector, y, kHalfBack);
-        const DepthRow depth(task.depth, y);
+        const DepthRow depth(*task.depth, y, *task.room);
+        HiddenRow hidden(task, order.shadows, width, order.before + i);
+        const SlowRow slow{task, row, depth, hidden};
+        if (i < 0) {
+            put(slow, hidden, 0);
+            hidden.find();
+            continue;
+        }
         T* out = reinterpret_cast<T*>(static_cast<char*>(task.registered.data) +
                                       y * task.registered.row_bytes);
         std::uint8_t* mask = task.mask + static_cast<std::size_t>(y) * width;
         const auto sample_at = [&](int x) HWY_ATTR {
-            const Float along = hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
             const int left = width - x;
             if (left >= kLanes) {
-                sample<T, kChannels>(task, source, row, depth.load(x), along, x,
-                                     out + kChannels * x, mask + x);
+                sample<T, kChannels>(slow, source, x, out + kChannels * x, mask + x);
                 return;
             }
-            sample<T, kChannels>(task, source, row, depth.load(x, left), along, x, pixels, codes);
+            sample<T, kChannels>(slow, source, x, pixels, codes);
             std::copy_n(pixels, kChannels * left, out + kChannels * x);
             std::copy_n(codes, left, mask + x);
         };
-        int x = 0;
+        int whole = 0;  // up to here all is done by stretches
 #if HWY_TARGET != HWY_SCALAR
-        const RowPair rows(*task.projector, y);
-        while (!task.nearest && width - x >= kLanes) {
-            const int count = std::min(kVectors, (width - x) / kLanes);
-            Vectors left =
-                register_stretch<T, kChannels>(task, source, reach, rows, depth, y, x, count,
-                                               out + kChannels * x, mask + x, stretch);
-            for (; left; left &= left - 1) sample_at(x + kLanes * first_of(left));
-            x += count * kLanes;
-        }
+        if (!task.nearest) whole = width / kLanes * kLanes;
 #endif
-        for (; x < width; x += kLanes) sample_at(x);
+        if (task.row_grid) put(slow, hidden, whole);
+#if HWY_TARGET != HWY_SCALAR
+        if (whole > 0)
+            register_usual(UsualRow<T, kChannels>(task, source, depth, y, out, mask), whole, hidden,
+                           sample_at);
+#endif
+        if (whole == 0 && task.row_grid) hidden.find();
+        for (int x = whole; x < width; x += kLanes) sample_at(x);
     }
 }
 
@@ -100,20 +144,26 @@ void register_rows(const RowsTask& task, int begin, int end) {
 
 void map_rows(const RowsTask& task, int begin, int end, float* map) {
     const FloatTag d;
-    const int width = task.depth.view.width;
+    const int width = task.depth->width();
     const Float none = set(std::numeric_limits<double>::quiet_NaN());
-    for (int y = begin; y < end; ++y) {
+    const RowOrder order(task, begin, end);
+    for (int i = -order.before; i < order.count; ++i) {
+        const int y = order.row(i);
         const AnyRow row(*task.projector, y, kHalfBack);
-        const DepthRow depth(task.depth, y);
+        const DepthRow depth(*task.depth, y, *task.room);
         float* out = map + 2 * static_cast<std::size_t>(y) * width;
-        Float along = hn::Iota(d, 0.0f);
-        for (int x = 0; x < width; x += kLanes, along = hn::Add(along, set(double{kLanes}))) {
+        HiddenRow hidden(task, order.shadows, width, order.before + i);
+        const SlowRow slow{task, row, depth, hidden};
+        if (task.row_grid) {
+            put(slow, hidden, 0);
+            hidden.find();
+        }
+        if (i < 0) continue;
+        for (int x = 0; x < width; x += kLanes) {
             HWY_ALIGN float u[kLanes], v[kLanes];
-            const Float metres = depth.load(x, width - x);
-            Points p = locate(row, metres, along, x).points();
-            Mask valid = confine(*task.projector, metres, p);
-            if (task.cells && task.hide)
-                valid = hn::AndNot(hidden(*task.grid, task.cells, p), valid);
+            Points p = slow.locate(x).points();
+            Mask valid = confine(*task.projector, slow.depth(x), p);
+            if (task.hide) valid = hn::AndNot(slow.gone(x, p, valid), valid);
             hn::Store(hn::IfThenElse(valid, p.u, none), d, u);
             hn::Store(hn::IfThenElse(valid, p.v, none), d, v);
             for (int i = 0; i < std::min(kLanes, width - x); ++i) {
@@ -122,6 +172,15 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
             }
         }
     }
+}
+
+int stretches_bytes(int width) {
+#if HWY_TARGET != HWY_SCALAR
+    return static_cast<int>(sizeof(Stretch)) * (width / (kVectors * kLanes) + 1);
+#else
+    (void)width;
+    return 0;
+#endif
 }
 
 }  // namespace
@@ -135,8 +194,21 @@ namespace {
 
 HWY_EXPORT(register_rows);
 HWY_EXPORT(map_rows);
+HWY_EXPORT(stretches_bytes);
 
 }  // namespace
+
+void HiddenRoom::keep(int width, const RowGrid& grid) {
+    constexpr int kRoom = 128;  // two vectors more, whatever their length
+    constexpr int kRows = RowGrid::kMaxReach + 1;
+    stride = (width + kRoom) / 64 * 64;
+    for (auto* row : {&place, &inverse_z, &low, &behind}) row->keep(kRows * stride);
+    for (auto* row : {&breaks, &written}) row->keep(kRows * stride);
+    for (auto* row : {&high, &before}) row->keep(stride);
+    passed.keep(stride);
+    cells.keep(kRows * grid.room());
+    stretches.keep(HWY_DYNAMIC_DISPATCH(stretches_bytes)(width));
+}
 
 void register_rows(const RowsTask& task, int begin, int end) {
     HWY_DYNAMIC_DISPATCH(register_rows)(task, begin, end);

@@ -4,20 +4,15 @@
 #include <cstdint>
 
 #include "geometry/projector.hpp"
+#include "images/depth_rows.hpp"
 #include "register/cells.hpp"
 #include "xcalib/image.hpp"
 
 namespace xcalib {
 
-// Depth as the caller has it: float32 [m], or uint16 in units of `scale` metres.
-struct DepthView {
-    ImageView view;
-    float scale = 1;
-};
-
 // Raises the cells to the nearness of the points of rows [begin, end) that fall in them.
-void splat_rows(const Projector& projector, const DepthView& depth, const CellGrid& grid, int begin,
-                int end, Nearness* cells);
+void splat_rows(const Projector& projector, const DepthRows& depth, DepthRows::Room& room,
+                const CellGrid& grid, int begin, int end, Nearness* cells);
 
 // Rows [begin, end) of the cells of all `count` parts as one: the nearest of each, and where both
 // neighbours, left and right or above and below, are nearer, the farther of these: a surface whose
@@ -25,13 +20,32 @@ void splat_rows(const Projector& projector, const DepthView& depth, const CellGr
 void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begin, int end,
                 Nearness* out);
 
-// What all rows of a frame have in common. `cells` is null where occlusion is not looked for.
+// What a thread has of its own to find what is hidden in a row (hidden_row-inl.hpp).
+struct HiddenRoom {
+    int stride = 0;                      // of what is kept of this row and of those before it
+    AlignedRow<float> place, inverse_z;  // by pixels
+    AlignedRow<float> low, behind;       // by vectors
+    AlignedRow<std::uint32_t> breaks, written;  // by blocks of vectors
+    AlignedRow<Nearness> cells;
+    float nearest[RowGrid::kMaxReach + 1] = {};
+    AlignedRow<float> high, before;  // of this row alone, by vectors
+    AlignedRow<std::uint32_t> passed;
+    AlignedRow<char> stretches;  // a row of what is located
+
+    void keep(int width, const RowGrid& grid);
+};
+
+// What all rows of a frame have in common. `cells` and `row_grid` are null where occlusion is not
+// looked for.
 struct RowsTask {
     const Projector* projector;
-    DepthView depth;
+    const DepthRows* depth;
+    DepthRows::Room* room;  // the thread's
     const CellGrid* grid;
     const Nearness* cells;
-    bool hide;  // occluded pixels are 0 in the image, and NaN in the map
+    const RowGrid* row_grid;  // null where the cells are, or nothing, looked at
+    HiddenRoom* hidden;       // the thread's
+    bool hide;                // occluded pixels are 0 in the image, and NaN in the map
     ImageView source;
     bool nearest;
     MutableImageView registered;

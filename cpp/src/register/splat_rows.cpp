@@ -120,12 +120,12 @@ HWY_INLINE Vectors splat_together(const CellGrid& grid, const AnyRow& row, const
 }
 #endif
 
-void splat_rows(const Projector& projector, const DepthView& depth, const CellGrid& grid, int begin,
-                int end, Nearness* HWY_RESTRICT cells) {
-    const int width = depth.view.width;
+void splat_rows(const Projector& projector, const DepthRows& depth, DepthRows::Room& room,
+                const CellGrid& grid, int begin, int end, Nearness* HWY_RESTRICT cells) {
+    const int width = depth.width();
     for (int y = begin; y < end; ++y) {
         const AnyRow row(projector, y, 0, grid.per_pixel_x, grid.per_pixel_y);
-        const DepthRow depths(depth, y);
+        const DepthRow depths(depth, y, room);
         const auto splat_at = [&](int x) HWY_ATTR {
             const Float along = hn::Add(hn::Iota(FloatTag(), 0.0f), set(double(x)));
             const Float z = depths.load(x, width - x);
@@ -200,9 +200,9 @@ HWY_EXPORT(join_cells);
 
 }  // namespace
 
-void splat_rows(const Projector& projector, const DepthView& depth, const CellGrid& grid, int begin,
-                int end, Nearness* cells) {
-    HWY_DYNAMIC_DISPATCH(splat_rows)(projector, depth, grid, begin, end, cells);
+void splat_rows(const Projector& projector, const DepthRows& depth, DepthRows::Room& room,
+                const CellGrid& grid, int begin, int end, Nearness* cells) {
+    HWY_DYNAMIC_DISPATCH(splat_rows)(projector, depth, room, grid, begin, end, cells);
 }
 
 void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begin, int end,

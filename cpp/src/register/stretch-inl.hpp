@@ -9,6 +9,7 @@
 #endif
 
 #include "register/fixed-inl.hpp"
+#include "register/hidden_row-inl.hpp"
 #include "register/sample-inl.hpp"
 
 #if HWY_TARGET != HWY_SCALAR
@@ -18,9 +19,10 @@ namespace HWY_NAMESPACE {
 namespace {
 
 struct UsualVector {
-    // As in Located, and in Cells.
-    HWY_ALIGN float x[kLanes], y[kLanes], a[kLanes], b[kLanes];
-    HWY_ALIGN float cell_x[kLanes], cell_y[kLanes], inverse_z[kLanes];
+    HWY_ALIGN float x[kLanes], y[kLanes], a[kLanes], b[kLanes];  // as in Located
+};
+struct UsualCells {
+    HWY_ALIGN float x[kLanes], y[kLanes], inverse_z[kLanes];  // as in Cells
 };
 
 // The windows of the vectors. First the place of each vector's first point, as a float shifted by
@@ -58,18 +60,32 @@ struct Windows {
 
 struct Stretch {
     UsualVector vectors[kVectors];
-    Windows source, cells;
+    Windows source;
+};
+// Beside it, where a grid of cells tells what is hidden.
+struct CellStretch {
+    UsualCells vectors[kVectors];
+    Windows cells;
+};
+// What is to be told of what is hidden: nothing, by a grid of cells, or by a row of them.
+enum class Hiding { none, grid, row };
+
+// Where that is noted down.
+struct HidingRoom {
+    CellStretch* cells;
+    HiddenRow* row;
 };
 
 HWY_INLINE bool none(Int bits) { return hn::AllTrue(IntTag(), hn::Eq(bits, hn::Zero(IntTag()))); }
 
 // Where `count` vectors lie, from pixel `begin` of row y on. `out` is where they will be written.
-template <bool fixed, bool with_cells, bool bends>
+template <bool fixed, Hiding hiding, bool bends>
 HWY_INLINE void locate(const RowsTask& task, const AnyRow& row, const DepthRow& depths, int y,
-                       int begin, int count, const char* out, int vector_bytes, Stretch& stretch) {
+                       int begin, int count, const char* out, int vector_bytes, Stretch& stretch,
+                       const HidingRoom& room) {
     const FloatTag d;
     const Float least =
-        hn::Set(d, bends ? 0.0f : task.projector->least_depth(y, task.depth.view.width));
+        hn::Set(d, bends ? 0.0f : task.projector->least_depth(y, task.depth->width()));
     Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
     for (int i = 0; i < count; ++i) {
         UsualVector& vector = stretch.vectors[i];
@@ -95,18 +111,20 @@ HWY_INLINE void locate(const RowsTask& task, const AnyRow& row, const DepthRow& 
             hn::Store(at.a, d, vector.a);
             hn::Store(at.b, d, vector.b);
         }
-        if constexpr (with_cells) {
-            Points points = at.points();
-            if constexpr (fixed) {
-                points.u = hn::Mul(points.u, set(1 / kFixedUnit));
-                points.v = hn::Mul(points.v, set(1 / kFixedUnit));
-            }
-            const Cells cells(*task.grid, points);
-            hn::Store(cells.x, d, vector.cell_x);
-            hn::Store(cells.y, d, vector.cell_y);
-            hn::Store(at.inverse_z, d, vector.inverse_z);
-            stretch.cells.start(i, cells.x, cells.y);
+        Points points = at.points();
+        if constexpr (fixed) {
+            points.u = hn::Mul(points.u, set(1 / kFixedUnit));
+            points.v = hn::Mul(points.v, set(1 / kFixedUnit));
         }
+        if constexpr (hiding == Hiding::grid) {
+            const Cells cells(*task.grid, points);
+            UsualCells& of_vector = room.cells->vectors[i];
+            hn::Store(cells.x, d, of_vector.x);
+            hn::Store(cells.y, d, of_vector.y);
+            hn::Store(at.inverse_z, d, of_vector.inverse_z);
+            room.cells->cells.start(i, cells.x, cells.y);
+        }
+        if constexpr (hiding == Hiding::row) room.row->put(x, points, somewhere, along);
         along = hn::Add(along, set(double{kLanes}));
     }
 }
@@ -117,22 +135,20 @@ HWY_INLINE int first_row(int row, bool above, int last) {
     return std::clamp(above ? row - 1 : row, 0, last) - row;
 }
 
-// What is nearest in the cells of a window, at `index`.
-HWY_INLINE Int nearest_in_window(const CellGrid& grid, const Nearness* from, Int index) {
-    const IntTag di;
-    const hn::Repartition<Nearness, IntTag> pairs;
-    const auto nearest = hn::Max(hn::LoadU(pairs, from), hn::LoadU(pairs, from + grid.step()));
-    const Int both = hn::TableLookupLanes(
-        hn::BitCast(di, nearest),
-        hn::IndicesFromVec(di, hn::And(hn::ShiftRight<1>(index), set(kLanes - 1))));
-    return hn::IfThenElse(hn::TestBit(index, set(1)),
-                          hn::And(both, set(static_cast<int>(0xffff0000))),
-                          hn::ShiftLeft<16>(both));
+// Marks those of a vector that are hidden, all of which were valid.
+template <class T, int kChannels>
+HWY_INLINE void mark_vector(Mask hidden, bool hide, T* out, std::uint8_t* mask) {
+    if (hn::AllFalse(FloatTag(), hidden)) return;
+    store_codes(hn::IfThenElseZero(hn::RebindMask(IntTag(), hidden), code_of(Validity::occluded)),
+                mask);
+    if (!hide) return;
+    for (int k = 0; k < kLanes; ++k)
+        if (mask[k]) std::fill_n(out + kChannels * k, kChannels, T{0});
 }
 
 // Marks what is hidden of vectors of which all points lie within the source.
 template <class T, int kChannels>
-HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, Stretch& stretch,
+HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, CellStretch& stretch,
                             T* out, std::uint8_t* mask) {
     const FloatTag d;
     const IntTag di;
@@ -142,14 +158,14 @@ HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, St
     stretch.cells.place<0>(kBefore, std::max(0, grid.width - kBefore), grid.height - 1, 1,
                            grid.width);
     for (int i = 0; i < count; ++i) {
-        const UsualVector& vector = stretch.vectors[i];
-        const Int x = hn::BitCast(di, hn::Load(d, vector.cell_x));
-        const Int y = hn::BitCast(di, hn::Load(d, vector.cell_y));
+        const UsualCells& vector = stretch.vectors[i];
+        const Int x = hn::BitCast(di, hn::Load(d, vector.x));
+        const Int y = hn::BitCast(di, hn::Load(d, vector.y));
         const Int index = hn::Sub(x, set(stretch.cells.x[i]));
         const Int apart =
             hn::Or(hn::Xor(y, set(stretch.cells.y[i])), hn::AndNot(set(kWindow - 1), index));
         const Nearness* from = task.cells + stretch.cells.offset[i];
-        Float nearest_there = hn::BitCast(d, nearest_in_window(grid, from, index));
+        Float nearest_there = hn::BitCast(d, nearest_in_window(from, grid.step(), index));
         if (!none(apart)) {
             if (!((vectors >> i) & 1)) continue;
             // Where a lens bends rows, points often come into the next one.
@@ -160,19 +176,14 @@ HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count, St
             const Int row = hn::Sub(below, set(moved));
             if (bends && none(hn::Or(hn::AndNot(set(1), row), hn::AndNot(set(kWindow - 1), index))))
                 nearest_there = hn::BitCast(
-                    d,
-                    hn::IfThenElse(hn::Ne(row, hn::Zero(di)),
-                                   nearest_in_window(grid, from + (moved + 1) * grid.width, index),
-                                   nearest_in_window(grid, from + moved * grid.width, index)));
+                    d, hn::IfThenElse(
+                           hn::Ne(row, hn::Zero(di)),
+                           nearest_in_window(from + (moved + 1) * grid.width, grid.step(), index),
+                           nearest_in_window(from + moved * grid.width, grid.step(), index)));
             else nearest_there = nearest_in(grid, task.cells, hn::BitCast(d, x), hn::BitCast(d, y));
         }
-        const Mask behind = is_behind(grid, nearest_there, hn::Load(d, vector.inverse_z));
-        if (hn::AllFalse(d, behind)) continue;
-        store_codes(hn::IfThenElseZero(hn::RebindMask(di, behind), code_of(Validity::occluded)),
-                    mask + i * kLanes);
-        if (!task.hide) continue;
-        for (int k = i * kLanes; k < (i + 1) * kLanes; ++k)
-            if (mask[k]) std::fill_n(out + kChannels * k, kChannels, T{0});
+        mark_vector<T, kChannels>(is_behind(grid, nearest_there, hn::Load(d, vector.inverse_z)),
+                                  task.hide, out + i * kLanes * kChannels, mask + i * kLanes);
     }
 }
 
@@ -337,17 +348,57 @@ struct RowPair {
     }
 };
 
-template <bool fixed, bool with_cells>
+template <bool fixed, Hiding hiding>
 HWY_INLINE void locate_any(const RowsTask& task, const AnyRow& row, const DepthRow& depths, int y,
                            int begin, int count, const char* out, int vector_bytes,
-                           Stretch& stretch) {
+                           Stretch& stretch, const HidingRoom& room) {
     if (row.bends)
-        locate<fixed, with_cells, true>(task, row, depths, y, begin, count, out, vector_bytes,
-                                        stretch);
+        locate<fixed, hiding, true>(task, row, depths, y, begin, count, out, vector_bytes, stretch,
+                                    room);
     else
-        locate<fixed, with_cells, false>(task, row, depths, y, begin, count, out, vector_bytes,
-                                         stretch);
+        locate<fixed, hiding, false>(task, row, depths, y, begin, count, out, vector_bytes, stretch,
+                                     room);
 }
+
+// A row of the reference, on its way into the source.
+template <class T, int kChannels>
+struct UsualRow {
+    const RowsTask& task;
+    const Source& source;
+    const DepthRow& depths;
+    int y;
+    T* out;
+    std::uint8_t* mask;
+    Reach reach;
+    RowPair rows;
+    bool fixed = false;
+
+    HWY_INLINE UsualRow(const RowsTask& of, const Source& from, const DepthRow& depth, int at,
+                        T* to, std::uint8_t* codes)
+        : task(of), source(from), depths(depth), y(at), out(to), mask(codes),
+          reach(reach_of<T>(from, of.projector->step_along_row(of.depth->width() / 2, at))),
+          rows(*of.projector, at) {
+#if XCALIB_FIXED
+        fixed = sizeof(T) == 1 && kChannels == 1 && fits_fixed(source, reach);
+#endif
+    }
+
+    // Vectors, `count` from pixel `begin` on.
+    template <Hiding hiding>
+    HWY_INLINE void locate(int begin, int count, Stretch& stretch, const HidingRoom& room) const {
+        const auto* to = reinterpret_cast<const char*>(out + begin * kChannels);
+        constexpr int kBytes = int{sizeof(T)} * kLanes * kChannels;
+#if XCALIB_FIXED
+        if constexpr (sizeof(T) == 1 && kChannels == 1)
+            if (fixed)
+                return locate_any<true, hiding>(task, rows.fixed, depths, y, begin, count, to,
+                                                kBytes, stretch, room);
+#endif
+        locate_any<false, hiding>(task, rows.exact, depths, y, begin, count, to, kBytes, stretch,
+                                  room);
+    }
+    HWY_INLINE Vectors sample(int begin, int count, Stretch& stretch) const;
+};
 
 template <class T, Reach reach>
 HWY_INLINE Vectors sample_in(const Source& source, int count, bool bends, Stretch& stretch, T* out,
@@ -356,48 +407,71 @@ HWY_INLINE Vectors sample_in(const Source& source, int count, bool bends, Stretc
     return bends ? sample_windows_bent<T, reach>(source, others, stretch, out, mask) : others;
 }
 
-// Locates vectors of a row, `count` from pixel `begin` on, and samples them. Returns those of which
-// some points lie outside the source, or nowhere.
-template <class T, int kChannels, bool with_cells>
-HWY_INLINE Vectors sample_stretch(const RowsTask& task, const Source& source, Reach reach,
-                                  const RowPair& row, const DepthRow& depths, int y, int begin,
-                                  int count, T* out, std::uint8_t* mask, Stretch& stretch) {
-    const auto* to = reinterpret_cast<const char*>(out);
-    constexpr int kBytes = int{sizeof(T)} * kLanes * kChannels;
+// The same vectors, located. Returns those of which some points lie outside the source, or nowhere.
+template <class T, int kChannels>
+HWY_INLINE Vectors UsualRow<T, kChannels>::sample(int begin, int count, Stretch& stretch) const {
+    T* to = out + begin * kChannels;
+    std::uint8_t* codes = mask + begin;
     Vectors others = all_of(count);
 #if XCALIB_FIXED
     if constexpr (sizeof(T) == 1 && kChannels == 1) {
-        if (fits_fixed(source, reach)) {
-            locate_any<true, with_cells>(task, row.fixed, depths, y, begin, count, to, kBytes,
-                                         stretch);
-            others = sample_fixed(source, count, stretch, out, mask);
-            if (row.fixed.bends) others = sample_fixed_bent(source, others, stretch, out, mask);
-            return gather<T, 1, true>(source, others, stretch, out, mask);
+        if (fixed) {
+            others = sample_fixed(source, count, stretch, to, codes);
+            if (rows.fixed.bends) others = sample_fixed_bent(source, others, stretch, to, codes);
+            return gather<T, 1, true>(source, others, stretch, to, codes);
         }
     }
 #endif
-    locate_any<false, with_cells>(task, row.exact, depths, y, begin, count, to, kBytes, stretch);
     if constexpr (kChannels == 1) {
+        const bool bends = rows.exact.bends;
         if (reach == Reach::one)
-            others = sample_in<T, Reach::one>(source, count, row.exact.bends, stretch, out, mask);
+            others = sample_in<T, Reach::one>(source, count, bends, stretch, to, codes);
         else if (reach == Reach::two)
-            others = sample_in<T, Reach::two>(source, count, row.exact.bends, stretch, out, mask);
+            others = sample_in<T, Reach::two>(source, count, bends, stretch, to, codes);
     }
-    return gather<T, kChannels, false>(source, others, stretch, out, mask);
+    return gather<T, kChannels, false>(source, others, stretch, to, codes);
 }
 
-// The same, and marks what is hidden. Returns those that are to be done one by one.
-template <class T, int kChannels>
-HWY_INLINE Vectors register_stretch(const RowsTask& task, const Source& source, Reach reach,
-                                    const RowPair& row, const DepthRow& depths, int y, int begin,
-                                    int count, T* out, std::uint8_t* mask, Stretch& stretch) {
-    if (!task.cells)
-        return sample_stretch<T, kChannels, false>(task, source, reach, row, depths, y, begin,
-                                                   count, out, mask, stretch);
-    const Vectors others = sample_stretch<T, kChannels, true>(task, source, reach, row, depths, y,
-                                                              begin, count, out, mask, stretch);
-    mark_hidden<T, kChannels>(task, all_of(count) & ~others, count, stretch, out, mask);
-    return others;
+// The whole vectors of a row, of which one(x) does those that are not usual.
+template <class T, int kChannels, class One>
+HWY_INLINE void register_usual(const UsualRow<T, kChannels>& row, int whole, HiddenRow& hidden,
+                               const One& one) {
+    const RowsTask& task = row.task;
+    const int vectors = whole / kLanes;
+    const auto finish = [&](int begin, Vectors others) HWY_ATTR {
+        for (; others; others &= others - 1) one(begin + kLanes * first_of(others));
+    };
+    if (!task.row_grid) {
+        Stretch stretch;
+        CellStretch cells;
+        for (int i = 0; i < vectors; i += kVectors) {
+            const int begin = i * kLanes, n = std::min(kVectors, vectors - i);
+            if (task.cells) row.template locate<Hiding::grid>(begin, n, stretch, {&cells, nullptr});
+            else row.template locate<Hiding::none>(begin, n, stretch, {nullptr, nullptr});
+            const Vectors others = row.sample(begin, n, stretch);
+            if (task.cells)
+                mark_hidden<T, kChannels>(task, all_of(n) & ~others, n, cells,
+                                          row.out + begin * kChannels, row.mask + begin);
+            finish(begin, others);
+        }
+        return;
+    }
+    auto* stretches = reinterpret_cast<Stretch*>(task.hidden->stretches.data());
+    for (int i = 0; i < vectors; i += kVectors)
+        row.template locate<Hiding::row>(i * kLanes, std::min(kVectors, vectors - i),
+                                         stretches[i / kVectors], {nullptr, &hidden});
+    const bool any = hidden.find();
+    for (int i = 0; i < vectors; i += kVectors) {
+        const int begin = i * kLanes, n = std::min(kVectors, vectors - i);
+        const Vectors others = row.sample(begin, n, stretches[i / kVectors]);
+        for (int k = 0; any && k < n; ++k) {
+            const int x = begin + k * kLanes;
+            if (hidden.may_be_hidden(x) && !((others >> k) & 1))
+                mark_vector<T, kChannels>(hidden.hidden(x), task.hide, row.out + x * kChannels,
+                                          row.mask + x);
+        }
+        finish(begin, others);
+    }
 }
 
 }  // namespace

@@ -2,9 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <charconv>
 #include <cmath>
-#include <initializer_list>
 #include <locale>
 #include <sstream>
 #include <stdexcept>
@@ -12,109 +10,11 @@
 #include "base/format.hpp"
 #include "base/whole_file.hpp"
 #include "rig_file/document.hpp"
+#include "rig_file/section.hpp"
+#include "rig_file/verdict_section.hpp"
 
 namespace xcalib {
 namespace {
-
-[[noreturn]] void reject(const std::string& path, const std::string& what) {
-    throw std::invalid_argument(path + ": " + what);
-}
-
-// The shortest text that reads back as the same double, whatever the locale.
-std::string text_of(double value) {
-    char buffer[32];
-    const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
-    return std::string(buffer, end);
-}
-
-// A mapping of which every key is known, and present but for those that may be left out.
-class Section {
-   public:
-    Section(const std::string& path, std::string name, const YAML::Node& node,
-            std::initializer_list<const char*> keys,
-            std::initializer_list<const char*> optional = {})
-        : path_(path), name_(std::move(name)), node_(node) {
-        if (!node.IsMap()) reject(path, "expected a mapping of fields in " + name_);
-        for (const auto& item : node) {
-            const std::string key = item.first.as<std::string>();
-            bool known = false;
-            for (const auto& list : {keys, optional})
-                for (const char* expected : list) known = known || key == expected;
-            if (!known)
-                reject(path, "unknown field '" + quoted(key) + "' in " + name_ + ", expected " +
-                                 joined(keys) + (optional.size() ? ", and if needed " : "") +
-                                 joined(optional) + "; notes go behind a #");
-        }
-        for (const char* key : keys)
-            if (!node[key])
-                reject(path, std::string("missing field '") + key + "' in " + name_ +
-                                 ", expected " + joined(keys));
-    }
-
-    YAML::Node node(const char* key) const { return node_[key]; }
-
-    std::string text(const char* key) const {
-        if (!node_[key].IsScalar()) fail(key, "(not a single value)", "text");
-        return node_[key].Scalar();
-    }
-
-    int size(const char* key) const {
-        int value = 0;
-        const std::string text = node_[key].IsScalar() ? node_[key].Scalar() : "";
-        const char* const end = text.data() + text.size();
-        const auto [stopped, error] = std::from_chars(text.data(), end, value);
-        if (stopped != end || error != std::errc() || value < 1)
-            fail(key, scalar(node_[key]), "a whole number of px, at least 1, as in 640");
-        return value;
-    }
-
-    double number(const char* key) const { return number(key, node_[key]); }
-
-    std::vector<double> numbers(const char* key, std::size_t count) const {
-        const YAML::Node list = node_[key];
-        if (!list.IsSequence() || list.size() != count)
-            fail(key, list.IsSequence() ? std::to_string(list.size()) + " values" : scalar(list),
-                 "a list of " + std::to_string(count) + " numbers");
-        return numbers(key);
-    }
-
-    std::vector<double> numbers(const char* key) const {
-        const YAML::Node list = node_[key];
-        if (!list.IsSequence()) fail(key, scalar(list), "a list of numbers");
-        std::vector<double> out;
-        for (const YAML::Node& item : list) out.push_back(number(key, item));
-        return out;
-    }
-
-    [[noreturn]] void fail(const char* key, const std::string& value,
-                           const std::string& expected) const {
-        reject(path_, name_ + "." + key + " = " + quoted(value) + ", expected " + expected);
-    }
-
-   private:
-    static std::string scalar(const YAML::Node& node) {
-        return node.IsScalar() ? node.Scalar() : "(not a single value)";
-    }
-    static std::string joined(const std::initializer_list<const char*>& names) {
-        std::string text;
-        for (const char* name : names) text += (text.empty() ? "" : ", ") + std::string(name);
-        return text;
-    }
-    double number(const char* key, const YAML::Node& node) const {
-        double value = 0;
-        const std::string text = node.IsScalar() ? node.Scalar() : "";
-        const char* const end = text.data() + text.size();
-        const auto [stopped, error] = std::from_chars(text.data(), end, value);
-        // Of a number that is too large or too small there is an error, and no value.
-        if (stopped != end || error != std::errc() || !std::isfinite(value))
-            fail(key, scalar(node), "a finite number");
-        return value;
-    }
-
-    const std::string& path_;
-    std::string name_;
-    YAML::Node node_;
-};
 
 Lens read_lens(const std::string& path, const std::string& name, const YAML::Node& node) {
     const Section section(path, name, node, {"model", "coefficients"});
@@ -176,14 +76,14 @@ void write_camera(std::ostream& out, const char* name, const Pinhole& camera) {
 }
 
 bool needs_version_2(const Rig& rig) {
-    return rig.source_mirrored || rig.reference.lens.model() != LensModel::none ||
+    return rig.verdict || rig.source_mirrored || rig.reference.lens.model() != LensModel::none ||
            rig.source.lens.model() != LensModel::none;
 }
 
 Rig parse_rig(const std::string& path, const YAML::Node& root) {
     const Section file(path, "the file", root,
                        {"format", "version", "reference", "source", "source_from_reference"},
-                       {"relative_depth", "source_mirrored"});
+                       {"relative_depth", "source_mirrored", "calibration"});
     if (file.text("format") != "xcalib-rig") file.fail("format", file.text("format"), "xcalib-rig");
     if (file.text("version") != "1" && file.text("version") != "2")
         file.fail("version", file.text("version"), "1 or 2");
@@ -200,11 +100,9 @@ Rig parse_rig(const std::string& path, const YAML::Node& root) {
         const Section relative(path, "relative_depth", node, {"scale", "shift"});
         rig.relative_depth = RelativeDepth{relative.number("scale"), relative.number("shift")};
     }
-    if (file.node("source_mirrored")) {
-        const std::string word = file.text("source_mirrored");
-        if (word != "true" && word != "false") file.fail("source_mirrored", word, "true or false");
-        rig.source_mirrored = word == "true";
-    }
+    if (file.node("source_mirrored")) rig.source_mirrored = file.flag("source_mirrored");
+    if (const YAML::Node node = file.node("calibration"))
+        rig.verdict = std::make_shared<const Verdict>(read_verdict(path, node));
     try {
         rig.validate();
     } catch (const std::invalid_argument& error) {
@@ -249,6 +147,7 @@ std::string rig_text(const Rig& rig) {
         out << "relative_depth:\n"
             << "  scale: " << text_of(rig.relative_depth->scale) << "\n"
             << "  shift: " << text_of(rig.relative_depth->shift) << "\n";
+    if (rig.verdict) write_verdict(out, *rig.verdict);
     return out.str();
 }
 

@@ -1,9 +1,13 @@
 #include "xcalib/calibration_options.hpp"
 
 #include <cmath>
+#include <locale>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
 
+#include "xcalib/error.hpp"
+#include "xcalib/parameters.hpp"
 #include "xcalib/threads.hpp"
 
 namespace xcalib {
@@ -42,6 +46,22 @@ void AdamOptions::validate() const {
             translation_scales, "1 to 3");
 }
 
+Tolerance Tolerance::parse(const std::string& option, const std::string& text) {
+    constexpr double kWider = 2.5;
+    std::vector<double> values;
+    std::istringstream parts(text + ",");
+    parts.imbue(std::locale::classic());
+    double value = 0;
+    char comma = 0;
+    while (parts >> value >> comma && comma == ',' && value > 0) values.push_back(value);
+    parts.clear();
+    const bool whole = parts.peek() == std::istringstream::traits_type::eof();
+    if (!whole || values.empty() || values.size() > 2)
+        throw InputError(option + " is '" + text +
+                         "', expected MEDIAN or MEDIAN,P95: pixels above 0, as 2,5");
+    return {values[0], values.size() > 1 ? values[1] : kWider * values[0]};
+}
+
 void CalibrationOptions::validate() const {
     require(max_frames >= 1, "max_frames", max_frames, "at least 1");
     require(num_threads >= 0 && num_threads <= kMaxThreads, "num_threads", num_threads,
@@ -60,7 +80,16 @@ void CalibrationOptions::validate() const {
     if (source_camera) source_camera->validate("options: source_camera");
     if (reference_lens) reference_lens->validate("options: reference_lens");
     if (source_lens) source_lens->validate("options: source_lens");
+    if (optimize_lens && source_camera)
+        throw std::invalid_argument(
+            "options: optimize_lens beside source_camera, which is kept, expected one of them");
+    if (optimize_lens && source_lens && !has_lens_parameters(*source_lens))
+        throw std::invalid_argument(
+            "options: optimize_lens with source_lens = " + Lens::word(source_lens) +
+            ", expected brown of 4 or 5 coefficients, or none given");
     search.validate();
+    require(tolerance.median > 0, "tolerance.median", tolerance.median, "more than 0 px");
+    require(tolerance.p95 > 0, "tolerance.p95", tolerance.p95, "more than 0 px");
     if (relative_depth) relative_depth->validate("options: relative_depth");
     if (solver != Solver::adam) return;
     if (search.mode == SearchMode::full || search.mode == SearchMode::local)

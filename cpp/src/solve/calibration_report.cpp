@@ -41,9 +41,10 @@ std::string LagReport::line() const {
 
 std::string CalibrationReport::brief() const {
     return format(
-        "%s: %s; %zu pairs, NEC %.3f (%.3f when displaced), %.0f %% of the edges covered, %.1f s",
-        converged ? "converged" : "NOT converged", message.c_str(), frames.size(), nec,
-        baseline_nec, 100 * valid_share, seconds);
+        "%s: %s; %zu pairs, depths of %.3g to %.3g m (median %.3g), NEC %.3f (%.3f when "
+        "displaced), %.0f %% of the edges covered, %.1f s",
+        converged ? "converged" : "NOT converged", message.c_str(), frames.size(), near_m, far_m,
+        middle_m, nec, baseline_nec, 100 * valid_share, seconds);
 }
 
 std::string CalibrationReport::full() const {
@@ -53,6 +54,8 @@ std::string CalibrationReport::full() const {
         "%.1f values, %.1f Jacobians, %.1f solver\n",
         working_width, working_height, seconds, time.prepare, time.search, time.warp, time.value,
         time.jacobian, time.solver);
+    for (const std::string& weak : weak_directions)
+        text += "for a tenth of a pixel could slide " + weak + "\n";
     text += "candidate   score   corr  overlap  refined  HFoV reference / source [deg]\n";
     for (std::size_t i = 0; i < candidates.size(); ++i) {
         const CandidateReport& c = candidates[i];

@@ -12,10 +12,13 @@ Plan::Plan(const CalibrationOptions& given, const FlowEstimator& flow, const Par
         options.flow == FlowMode::on || (options.flow == FlowMode::automatic && flow);
     uses_flow = wanted || (options.flow == FlowMode::automatic && !searches);
     from_coarsest = wanted;
-    const bool lens_is_known = options.source_camera || options.source_lens;
+    const bool lens_is_known =
+        options.source_camera || (options.source_lens && !options.optimize_lens);
     // Depth of unknown shift takes up what bends, and is told apart from it by nothing.
-    fits_focal = !options.reference_camera && !options.optimize_reference;
-    estimates_lens = options.solver == Solver::ceres && !lens_is_known && !options.relative_depth;
+    fits_gauge = !options.reference_camera && !options.optimize_reference;
+    estimates_lens = options.solver == Solver::ceres && !lens_is_known &&
+                     (options.optimize_lens || !options.relative_depth);
+    if (options.optimize_lens && options.solver == Solver::adam) lens_coefficients = 2;
 }
 
 }  // namespace xcalib

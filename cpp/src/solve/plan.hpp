@@ -36,9 +36,10 @@ struct Plan {
     // So many of k1 and k2 of the source move, in stage 2 at the finer levels; k1 in any case where
     // one that is estimated bends.
     int lens_coefficients = 0;
-    // Both focal lengths of the reference move together at the finer levels where the source's lens
-    // bends: of pinholes they are a gauge, but a lens is as strong as it is at one of them only.
-    bool fits_focal;
+    // The reference's principal point, and both of its focal lengths together, move at the finer
+    // levels where the source's lens bends: of pinholes they are a gauge, but a lens bends about
+    // one point, and is as strong as it is at one focal length only.
+    bool fits_gauge;
 };
 
 }  // namespace xcalib

@@ -12,6 +12,8 @@
 namespace xcalib {
 namespace {
 
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
 // x - x0: Eq. (camera_regularization) once a Huber loss acts on its norm.
 class HoldCost : public ceres::CostFunction {
    public:
@@ -41,25 +43,10 @@ int free_lens_coefficients(const Plan& plan, int stage, int factor, const Rig& r
     return factor < kCoarse ? plan.lens_coefficients : 0;
 }
 
-// What moves in a stage: all but the paper's frozen sets, and what is known.
-Parameters free_parameters(int stage, const CalibrationOptions& options, int lens, bool focal) {
-    const bool source_free = !options.source_camera;
-    const bool reference_free = options.optimize_reference && !options.reference_camera;
-    Parameters free(0);
-    for (int p = 0; p < kNumParameters; ++p) {
-        const bool late = p == kRotationZ || p == kTranslationZ || p == kSourceCx ||
-                          p == kSourceCy || p == kSourceSkew || p >= kReferenceCx;
-        const bool known = (p <= kSourceSkew && !source_free) || (p >= kSourceK1 + lens) ||
-                           (p >= kReferenceLogFx && p < kSourceK1 && !reference_free &&
-                            !(focal && p <= kReferenceLogFy));
-        if (!known && !(stage == 1 && late)) free.add(p);
-    }
-    return free;
-}
-
-// The same for Ceres.
+// What does not move in a stage, for Ceres.
 void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
-            const CalibrationOptions& options, int lens, bool focal) {
+            const CalibrationOptions& options, const Moving& moving) {
+    const int lens = moving.lens_coefficients;
     const bool source_known = options.source_camera.has_value();
     const bool reference_free = options.optimize_reference && !options.reference_camera;
     if (stage == 1) {
@@ -75,10 +62,29 @@ void freeze(ceres::Problem& problem, SolverParameters& p, int stage,
     if (lens == 1) problem.SetManifold(p.source_lens, new ceres::SubsetManifold(2, {1}));
     for (double* block : {p.reference.log_f, p.reference.center, p.reference.skew_share})
         if (!reference_free || (stage == 1 && block != p.reference.log_f)) {
-            if (focal && block == p.reference.log_f)
+            if (moving.gauge && block == p.reference.log_f)
                 problem.SetManifold(block, new TogetherManifold);
-            else problem.SetParameterBlockConstant(block);
+            else if (!moving.gauge || block != p.reference.center)
+                problem.SetParameterBlockConstant(block);
         }
+}
+
+// Footage tells little of the reference's camera, and only by what the source's lens bends:
+// ordinary cameras are preferred by as much as a thousandth of NEC is worth.
+void hold_gauge(ceres::Problem& problem, SolverParameters& p, const Pinhole& size,
+                const CalibrationOptions& options) {
+    constexpr double kWorth = 1e-3;
+    const double hfov = options.reference_hfov_deg.value_or(55) * kDegree;
+    const double log_f = std::log(0.5 / std::tan(hfov / 2));
+    const auto hold = [&](std::vector<double> at, double deviation, double* block) {
+        problem.AddResidualBlock(
+            new HoldCost(std::move(at)),
+            new ceres::ScaledLoss(nullptr, kWorth / (deviation * deviation), ceres::TAKE_OWNERSHIP),
+            block);
+    };
+    hold({log_f, log_f + std::log(static_cast<double>(size.width) / size.height)},
+         std::sqrt(2.0) * kLogFocalDeviation, p.reference.log_f);
+    hold({0.5, 0.5}, kCenterDeviation, p.reference.center);
 }
 
 // Condition number by the free parameters, with columns scaled to unit norm: it shows coupled
@@ -104,6 +110,26 @@ double condition_number(ceres::Problem& problem) {
 }
 
 }  // namespace
+
+Moving moving_parameters(int stage, int factor, const Plan& plan, const Rig& rig) {
+    const CalibrationOptions& options = plan.options;
+    Moving moving;
+    moving.lens_coefficients = free_lens_coefficients(plan, stage, factor, rig);
+    const bool bends = rig.source.lens.bends() && factor < kCoarse;
+    moving.gauge = plan.fits_gauge && stage == 2 && (moving.lens_coefficients > 0 || bends);
+    const bool source_free = !options.source_camera;
+    const bool reference_free = options.optimize_reference && !options.reference_camera;
+    for (int p = 0; p < kNumParameters; ++p) {
+        const bool late = p == kRotationZ || p == kTranslationZ || p == kSourceCx ||
+                          p == kSourceCy || p == kSourceSkew || p >= kReferenceCx;
+        const bool known = (p <= kSourceSkew && !source_free) ||
+                           (p >= kSourceK1 + moving.lens_coefficients) ||
+                           (p >= kReferenceLogFx && p < kSourceK1 && !reference_free &&
+                            !(moving.gauge && p <= kReferenceCy));
+        if (!known && !(stage == 1 && late)) moving.parameters.add(p);
+    }
+    return moving;
+}
 
 double seconds_now() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
@@ -150,10 +176,8 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
     ceres::Problem problem;
     const Rig sizes = level.rig_at(rig);
     const std::vector<double*> blocks = RigCost::blocks(p);
-    const int lens = free_lens_coefficients(plan, stage, level.factor, rig);
-    const bool bends = rig.source.lens.bends() && level.factor < kCoarse;
-    const bool focal = plan.fits_focal && stage == 2 && (lens > 0 || bends);
-    const Parameters free = free_parameters(stage, options, lens, focal);
+    const Moving moving = moving_parameters(stage, level.factor, plan, rig);
+    const Parameters& free = moving.parameters;
     for (std::size_t i = 0; i < level.pairs.size() && plan.parts.images; ++i)
         problem.AddResidualBlock(
             new NecCost(*level.pairs[i], sizes, level.weights[i], share_limit, free), nullptr,
@@ -171,7 +195,8 @@ LevelReport solve_level(const Level& level, const std::vector<FlowTargets>& flow
         hold(held.translation, 3, 0.1, p.translation);
         hold(held.quaternion, 4, 0.05, p.quaternion);
     }
-    freeze(problem, p, stage, options, lens, focal);
+    if (moving.gauge) hold_gauge(problem, p, sizes.reference, options);
+    freeze(problem, p, stage, options, moving);
 
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_QR;

@@ -19,6 +19,18 @@ LevelReport report_on(const Level& level, int stage, const Rig& rig, int num_thr
 // The valid share below which a fit is penalised that starts where it is `valid_share`.
 inline double share_limit(double valid_share) { return 0.8 * valid_share; }
 
+// What moves in a stage at a level: all but the paper's frozen sets, and what is known.
+struct Moving {
+    Parameters parameters = Parameters(0);
+    int lens_coefficients = 0;  // of k1 and k2
+    // The principal point of the reference, and both of its focal lengths by the same.
+    bool gauge = false;
+};
+// By which ordinary cameras differ from 55 deg, and from a principal point in the image's middle
+// [widths].
+inline constexpr double kLogFocalDeviation = 0.4, kCenterDeviation = 0.02;
+Moving moving_parameters(int stage, int factor, const Plan& plan, const Rig& rig);
+
 // Levenberg-Marquardt from `rig`, which is replaced. Stage 1 has the paper's frozen set and a prior
 // that holds `anchor`, stage 2 everything free. A pair whose valid share falls below `share_limit`
 // is penalised for it. It stops where a step lowers the cost by less than the share `tolerance`.

@@ -68,24 +68,19 @@ LagReport fit_lags(const FittedFrames& frames, Stream& all_sources, const Rig& r
 
 void add_lags(const LagReport& lag, const TimeOffset& offset, const Stream& all_sources,
               CalibrationResult& result) {
-    CalibrationReport& report = result.report;
-    report.lag = lag;
+    result.report.lag = lag;
     if (lag.frames == 0 && lag.change == 0) return;
-    std::string late = lag.line() + ": ";
-    if (lag.change != 0)
-        late +=
-            "it lost frames, or a pause was not counted; give times of both (--source-times), or a "
-            "part of the footage";
-    else
-        late += "try " + option_for_lag(offset, lag.frames, clock_of(all_sources.frames()).value());
-    distrust(late, result);
+    result.distrust(
+        lag.line(),
+        lag.change != 0
+            ? "it lost frames, or a pause was not counted; give times of both (--source-times), or "
+              "a part of the footage"
+            : "try " + option_for_lag(offset, lag.frames, clock_of(all_sources.frames()).value()));
 }
 
 void distrust(const std::string& line, CalibrationResult& result) {
-    if (line.empty()) return;
-    CalibrationReport& report = result.report;
-    report.message = report.converged ? line : report.message + "; " + line;
-    report.converged = result.converged = false;
+    const std::size_t advice = line.find("; ");
+    if (!line.empty()) result.distrust(line.substr(0, advice), line.substr(advice + 2));
 }
 
 }  // namespace xcalib

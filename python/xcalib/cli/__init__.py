@@ -7,16 +7,42 @@ Results go to stdout, progress and errors to stderr. Exit codes: 0 done and trus
 from __future__ import annotations
 
 from importlib import import_module
+from typing import Any
 
 import click
 
 from .errors import ErrorsInOneLine, open_standard_streams
+from .options import ARGUMENTS
 
-COMMANDS = ("calibrate", "demo", "evaluate", "inspect", "models", "register", "report")
+COMMANDS = (
+    "calibrate",
+    "convert",
+    "demo",
+    "evaluate",
+    "inspect",
+    "models",
+    "register",
+    "report",
+    "transfer",
+    "view",
+)
 
 
 class Commands(ErrorsInOneLine):
     """The commands by the names of their modules."""
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        """With the arguments, for those who want to repeat the command."""
+        given = list(args)
+        context = super().make_context(info_name, args, parent, **extra)
+        context.meta[ARGUMENTS] = given
+        return context
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)

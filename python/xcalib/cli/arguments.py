@@ -47,13 +47,13 @@ frames_arguments = options(
         help="Take arguments from a YAML file, by their names without dashes (reference, source,"
         " depth, ...); those given here go before.",
     ),
-    click.option(
-        "--dry-run",
-        is_flag=True,
-        help="Print what would be read, paired and written, and do no more.",
-    ),
 )
 
+dry_run_option = click.option(
+    "--dry-run",
+    is_flag=True,
+    help="Print what would be read, paired and written, and do no more.",
+)
 quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
 threads_option = click.option(
     "--threads",
@@ -73,8 +73,10 @@ colormap_option = click.option(
 
 
 def load_rig(path: Path) -> Rig:
-    """The rig of a file, with a warning of what is not plausible in it."""
-    rig = Rig.load(path)
+    """The rig of a file, ours or another tool's, with a warning of what is not plausible in it."""
+    from ..convert import is_foreign, read_rig  # seldom needed, and it loads much
+
+    rig = read_rig(path) if is_foreign(path) else Rig.load(path)
     for line in _core.implausible(rig):
         warn(f"{path}: {line}")
     return rig

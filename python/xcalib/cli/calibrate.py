@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ from .._core import (
     CalibrationOptions,
     Lens,
     Pinhole,
+    Tolerance,
     _flow_arguments,
     draw_frames,
     left_out,
@@ -20,8 +22,8 @@ from .._core import (
 )
 from ..flow import FlowProvider, NetworkFlow
 from ..footage import lens_of_topic
-from ..frames import Image, InputError, check_file_writable, size_of, write_bytes
-from ..pipeline import choose_by_content, run_calibration, save_rig, with_fitted_plane
+from ..frames import Image, InputError, check_file_writable, same_aspect, size_of, write_bytes
+from ..pipeline import Frames, choose_by_content, run_calibration, save_rig, with_fitted_plane
 from .arguments import (
     COUNT,
     DEFAULTS,
@@ -29,6 +31,7 @@ from .arguments import (
     WORDS,
     check_writes,
     colormap_option,
+    dry_run_option,
     frames_arguments,
     load_rig,
     open_frames,
@@ -39,7 +42,7 @@ from .arguments import (
     with_scalar_sources,
 )
 from .errors import NOT_TRUSTED, stop, warn
-from .options import Input, Output
+from .options import ARGUMENTS, Input, Output
 from .sections import Sectioned
 
 LAG_ROUNDS = 2
@@ -48,10 +51,15 @@ LAG_ROUNDS = 2
 
 def intrinsics(
     ctx: click.Context, param: click.Parameter, value: str | None
-) -> tuple[float, float, float, float] | None:
-    """Parse ``FX,FY,CX,CY`` in pixels."""
+) -> tuple[float, float, float, float] | Pinhole | None:
+    """Parse ``FX,FY,CX,CY`` in pixels, or read the camera of a file."""
     if value is None:
         return None
+    if Path(value).exists():
+        from ..convert import read_camera  # seldom needed, and it loads much
+
+        assert param.name is not None
+        return read_camera(value, param.name.removesuffix("_intrinsics"))
     try:
         fx, fy, cx, cy = (float(part) for part in value.split(","))
     except ValueError:
@@ -59,6 +67,22 @@ def intrinsics(
     if not (fx > 0 and fy > 0 and all(map(math.isfinite, (fx, fy, cx, cy)))):
         raise click.BadParameter(f"{value!r}: expected finite numbers, FX and FY above 0 px")
     return fx, fy, cx, cy
+
+
+def known_camera(
+    given: tuple[float, float, float, float] | Pinhole, image: Image, topic: str, lens: str
+) -> Pinhole:
+    """The camera of ``--reference-intrinsics`` or ``--source-intrinsics`` behind an image."""
+    if isinstance(given, Pinhole):
+        size, own = size_of(image), (given.width, given.height)
+        if not same_aspect(size, own):
+            raise InputError(
+                f"the camera given is of {own[0]}x{own[1]} px, the images are {size[0]}x{size[1]};"
+                " expected the same aspect"
+            )
+        return given if size == own else given.resized(*size)
+    found = lens_of_topic(topic) if lens == "auto" else None
+    return Pinhole(*size_of(image), *given, lens=found or Lens())
 
 
 def lens_option(camera: str) -> Callable[[Any], Any]:
@@ -85,8 +109,24 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     return "on", NetworkFlow(spec)
 
 
+def frames_again(arguments: list[str], lag: int) -> Frames:
+    """The frames that ``xcalib`` or ``xcalib-cli`` with such arguments calibrated, opened anew."""
+    if command.name not in arguments:
+        raise InputError(f"its command is {' '.join(arguments)}, expected a calibration")
+    own = arguments[arguments.index(command.name) + 1 :]
+    try:
+        options = command.make_context(command.name, own).params
+    except click.ClickException as error:
+        raise InputError(error.format_message()) from None
+    initial = load_rig(options["initial"]) if options["initial"] else None
+    frames = open_frames(options, options["threads"], initial)
+    frames = with_scalar_sources(frames, options["source_colormap"])
+    return frames.with_lag(lag, [])[0] if lag else frames
+
+
 @click.command("calibrate", cls=Sectioned)
 @frames_arguments
+@dry_run_option
 @click.option(
     "-o",
     "--output",
@@ -179,15 +219,19 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
 )
 @click.option(
     "--reference-intrinsics",
-    metavar="FX,FY,CX,CY",
+    metavar="FX,FY,CX,CY|FILE",
     callback=intrinsics,
-    help="Known intrinsics of the reference camera, kept [px].  [default: none]",
+    help="Known intrinsics of the reference camera, kept [px], or a file that `xcalib convert`"
+    " reads, with its lens."
+    "  [default: none]",
 )
 @click.option(
     "--source-intrinsics",
-    metavar="FX,FY,CX,CY",
+    metavar="FX,FY,CX,CY|FILE",
     callback=intrinsics,
-    help="Known intrinsics of the source camera, kept [px].  [default: none, estimated]",
+    help="Known intrinsics of the source camera, kept [px], or a file that `xcalib convert`"
+    " reads, with its lens."
+    "  [default: none, estimated]",
 )
 @lens_option("reference")
 @lens_option("source")
@@ -206,12 +250,27 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     help="Estimate the reference intrinsics too.  [default: kept]",
 )
 @click.option(
+    "--optimize-lens",
+    is_flag=True,
+    default=DEFAULTS.optimize_lens,
+    help="Estimate k1 and k2 of the source's lens, from --source-lens where given, and keep them"
+    " whether or not unseen frames gain; with --solver adam too.  [default: kept where they gain]",
+)
+@click.option(
     "--working-width",
     metavar="PX",
     type=COUNT,
     default=DEFAULTS.working_width,
     show_default=True,
     help="Reference width that calibration works at [px].",
+)
+@click.option(
+    "--tolerance",
+    metavar="MEDIAN[,P95]",
+    default="2,5",
+    show_default=True,
+    help="Expected error up to which the rig is trusted, over the footage's own depths [px of the"
+    " reference at 640 px of width].",
 )
 @click.option(
     "--refine-plane",
@@ -224,7 +283,7 @@ def flow_of(spec: str) -> tuple[str, FlowProvider | None]:
     "report_file",
     metavar="FILE",
     type=Output(check_file_writable),
-    help="Also write the full report (JSON), for `xcalib report`.",
+    help="Also write the full report: .html a page to look at, else JSON, for `xcalib report`.",
 )
 @quiet_option
 def command(
@@ -242,13 +301,15 @@ def command(
     max_fov_ratio: float,
     flow_spec: str,
     solver: str,
-    reference_intrinsics: tuple[float, float, float, float] | None,
-    source_intrinsics: tuple[float, float, float, float] | None,
+    reference_intrinsics: tuple[float, float, float, float] | Pinhole | None,
+    source_intrinsics: tuple[float, float, float, float] | Pinhole | None,
     reference_lens: str,
     source_lens: str,
     reference_hfov: float | None,
     optimize_reference: bool,
+    optimize_lens: bool,
     working_width: int,
+    tolerance: str,
     refine_plane: bool,
     report_file: Path | None,
     quiet: bool,
@@ -283,11 +344,13 @@ def command(
         working_width=working_width,
         reference_hfov_deg=reference_hfov,
         optimize_reference=optimize_reference,
+        optimize_lens=optimize_lens,
     )
     calibration.search.mode = search
     calibration.search.max_roll_deg = max_roll
     calibration.search.max_fov_ratio = max_fov_ratio
     calibration.mount = mount
+    calibration.tolerance = Tolerance.parse("--tolerance", tolerance)
     calibration.reference_lens = Lens.parse("--reference-lens", reference_lens)
     calibration.source_lens = Lens.parse("--source-lens", source_lens)
     calibration.solver = solver
@@ -296,14 +359,12 @@ def command(
 
     def set_cameras(calibration: CalibrationOptions, reference: Image, source: Image) -> None:
         if reference_intrinsics:
-            lens = lens_of_topic(inputs["reference"]) if reference_lens == "auto" else None
-            calibration.reference_camera = Pinhole(
-                *size_of(reference), *reference_intrinsics, lens=lens or Lens()
+            calibration.reference_camera = known_camera(
+                reference_intrinsics, reference, inputs["reference"], reference_lens
             )
         if source_intrinsics:
-            lens = lens_of_topic(inputs["source"]) if source_lens == "auto" else None
-            calibration.source_camera = Pinhole(
-                *size_of(source), *source_intrinsics, lens=lens or Lens()
+            calibration.source_camera = known_camera(
+                source_intrinsics, source, inputs["source"], source_lens
             )
 
     initial_rig = load_rig(initial) if initial else None
@@ -311,11 +372,15 @@ def command(
     check_writes([output, report_file], frames, inputs, initial)
     frames = with_scalar_sources(frames, source_colormap)
 
-    indices = None
+    arguments = list(click.get_current_context().meta.get(ARGUMENTS, ()))
+    indices, looked_at, lag_taken = None, [], 0
     if choose == "informed":
         choice = choose_by_content(frames, max_frames, seed, quiet)
         if explain:
             click.echo(choice.table(lambda index: frames.references.name(index)))
+        looked_at = [
+            (frames.references.where(c.index), c.taken, c.reason) for c in choice.candidates
+        ]
         if choice.unusable:
             first = choice.unusable[0]
             # What cannot be decoded names its file.
@@ -337,6 +402,7 @@ def command(
         result, chosen = run_calibration(
             frames, calibration, result.rig, quiet, set_cameras, chosen, warn
         )
+        arguments += ["--horizon", str(plane.horizon), "--plane-roll", str(plane.roll_deg)]
         click.echo(f"plane: --horizon {plane.horizon:g} --plane-roll {plane.roll_deg:g}")
     for _ in range(LAG_ROUNDS):
         lag = result.report.lag
@@ -344,6 +410,7 @@ def command(
             break
         click.echo(f"clock offset: {lag.line()}, taken up", err=True)
         frames, chosen = frames.with_lag(lag.frames, chosen)
+        lag_taken += lag.frames
         result, chosen = run_calibration(
             frames, calibration, initial_rig, quiet, set_cameras, chosen, warn, flow
         )
@@ -352,7 +419,16 @@ def command(
     click.echo(f"rig: {output}")
     if report_file is not None:
         files = [frames.references.where(index) for index in chosen]
-        write_bytes(report_file, report_document(result.report, str(output), files).encode())
+        document = report_document(
+            *(result.report, str(output), files, arguments, str(Path.cwd()), lag_taken, looked_at)
+        )
+        if report_file.suffix.lower() == ".html":
+            from ..report import Run, write_page  # seldom needed, and it loads much
+
+            run = Run(json.loads(document), result.rig, frames, chosen)
+            write_page(run, report_file, f"Calibration of {output}")
+        else:
+            write_bytes(report_file, document.encode())
         click.echo(f"report: {report_file}")
     say_depth(frames)
     if not result.converged:

@@ -10,9 +10,12 @@ import re
 import sys
 import traceback
 from pathlib import Path
-from typing import Any, NoReturn, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 import click
+
+if TYPE_CHECKING:
+    from .._core import Rig
 
 FAILED, WRONG_INPUT, NOT_TRUSTED = 1, 2, 3
 
@@ -21,6 +24,12 @@ def stop(code: int, message: str) -> NoReturn:
     """End the command with one line on stderr."""
     say("not to be trusted" if code == NOT_TRUSTED else "error", message)
     sys.exit(code)
+
+
+def require_trusted(rig: Rig, file: Path) -> None:
+    """End the command where the rig's calibration was not to be trusted."""
+    if rig.verdict and not rig.verdict.trusted:
+        stop(NOT_TRUSTED, f"{file}: {rig.verdict.line()}")
 
 
 def warn(message: str) -> None:

@@ -16,6 +16,7 @@ from .arguments import (
     COUNT,
     check_writes,
     colormap_option,
+    dry_run_option,
     frames_arguments,
     load_rig,
     open_frames,
@@ -26,7 +27,7 @@ from .arguments import (
     threads_option,
     with_scalar_sources,
 )
-from .errors import NOT_TRUSTED, stop
+from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Input, Output
 from .sections import Sectioned
 
@@ -36,6 +37,7 @@ from .sections import Sectioned
 )
 @rig_argument
 @frames_arguments
+@dry_run_option
 @click.option(
     "--width",
     metavar="PX",
@@ -96,6 +98,7 @@ def command(
         write_bytes(json_file, evaluation_document(result, str(rig_file), names).encode())
     if not result.valid_share:
         stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")
+    require_trusted(rig, rig_file)
 
 
 def given_images(spec: Path, frames: Frames) -> Picked:

@@ -8,6 +8,9 @@ from typing import Any, TypeVar
 
 import click
 
+ARGUMENTS = "xcalib.arguments"
+"""Key of a context's ``meta``: all arguments that the program was given."""
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 

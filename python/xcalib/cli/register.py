@@ -11,6 +11,7 @@ from ..frames import check_output_writable
 from ..registration import RegistrationOptions, run_registration
 from .arguments import (
     WORDS,
+    dry_run_option,
     frames_arguments,
     given_files,
     load_rig,
@@ -21,7 +22,7 @@ from .arguments import (
     say_depth,
     threads_option,
 )
-from .errors import NOT_TRUSTED, stop
+from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Output
 from .sections import Sectioned
 
@@ -31,6 +32,7 @@ from .sections import Sectioned
 )
 @rig_argument
 @frames_arguments
+@dry_run_option
 @click.option(
     "-o",
     "--output",
@@ -92,3 +94,4 @@ def command(
     say_depth(frames)
     if not total.valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")
+    require_trusted(rig, rig_file)

@@ -1,33 +1,44 @@
-"""`xcalib report`: the report of a calibration as text."""
+"""`xcalib report`: the report of a calibration, as text or as a page."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .._core import read_file
-from ..frames import InputError
-from .options import Input
+from ..frames import InputError, check_file_writable
+from ..report.run import load_document, of_report
+from .options import Input, Output
 
 
-@click.command("report", short_help="Print the report file of a calibration.")
-@click.argument("report_file", metavar="FILE", type=Input())
-def command(report_file: Path) -> None:
-    """Print the report that `xcalib calibrate --report FILE` wrote."""
-    try:
-        document = json.loads(read_file(report_file))
-    except InputError:
-        raise
-    except (ValueError, RecursionError):
-        raise InputError(f"{report_file}: not a JSON file") from None
-    kind = document.get("format") if isinstance(document, dict) else None
-    if kind != "xcalib-report" or document.get("version") != 1:
-        raise InputError(f"{report_file}: expected format xcalib-report, version 1")
-    click.echo("\n".join(lines_of(document)))
+@click.command("report", short_help="The report of a calibration, as text or as a page.")
+@click.argument("run", metavar="RUN", type=Input())
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE.html",
+    type=Output(check_file_writable),
+    help="Write a page to look at: pictures, charts, the rig.  [default: print the report]",
+)
+def command(run: Path, output: Path | None) -> None:
+    """Print the report that `xcalib calibrate --report FILE` wrote, or make a page of it.
+
+    RUN is that file, or the folder of `xcalib demo`. The page shows the frames themselves: they
+    are read again from where they were.
+    """
+    if output is None:
+        click.echo("\n".join(lines_of(load_document(run)[1])))
+        return
+    if output.suffix.lower() != ".html":
+        raise InputError(f"{output}: expected a name that ends in .html")
+    from ..report.page import write_page  # it loads much
+
+    file = output.absolute()
+    with of_report(run.absolute()) as found:
+        write_page(found, file, f"Calibration of {found.document['rig']}")
+    click.echo(f"page: {output}")
 
 
 def lines_of(document: dict[str, Any], indent: str = "") -> Iterator[str]:
