@@ -131,7 +131,8 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
 def open_frames(arguments: Mapping[str, Any], threads: int, rig: Rig | None) -> Frames:
     """Open what `frames_arguments` names, and print how frames were paired by time."""
     if arguments["depth_spec"] is None:
-        raise InputError(depth_choices())
+        click.echo(depth_choices(), err=True)
+        raise InputError("--depth is missing, expected one of those above")
     frames = Frames.open(inputs_of(arguments, threads), rig)
     for note in frames.notes:
         click.echo(note, err=True)
