@@ -44,6 +44,9 @@ def test_only_positive_finite_metres_are_known(tmp_path: Path, suffix: str) -> N
 @pytest.mark.parametrize(
     ("name", "values", "problem"),
     [
+        ("a.png", np.zeros((3, 4), np.uint16), "all depth is unknown"),
+        ("a.npy", np.full((3, 4), np.nan), "all depth is unknown"),
+        ("a.tiff", np.full((3, 4), np.inf, np.float32), "all depth is unknown"),
         ("a.png", np.ones((3, 4), np.uint8), "expected a 16-bit PNG"),
         ("a.npy", np.ones((3, 4), np.int32), "expected floats in metres"),
         ("a.npy", np.ones((3, 4, 2), np.float32), r"shape \(3, 4, 2\), expected one channel"),

@@ -15,15 +15,10 @@ namespace {
 
 constexpr auto kBetweenLines = std::chrono::seconds(10);
 
-// But for a list of options, each on a line of its own.
 std::string one_line(const std::string& text) {
+    std::istringstream words(text);
     std::string line;
-    for (std::size_t at = 0, next; at < text.size(); at = next) {
-        next = std::min(text.find("\n  --", at + 1), text.size());
-        std::istringstream words(text.substr(at, next - at));
-        const char* space = at == 0 ? "" : "\n  ";
-        for (std::string word; words >> word; space = " ") line += space + word;
-    }
+    for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
     return line;
 }
 

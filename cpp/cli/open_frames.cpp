@@ -1,6 +1,7 @@
 #include "open_frames.hpp"
 
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "depth.hpp"
 #include "footage.hpp"
@@ -19,7 +20,11 @@ Rig load_rig(const std::string& file, Console& console) {
 
 Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& rig,
                    Console& console) {
-    if (arguments.depth.spec.empty()) throw InputError(depth_choices());
+    if (arguments.depth.spec.empty()) {
+        std::istringstream choices(depth_choices());
+        for (std::string line; std::getline(choices, line);) console.note(line);
+        throw InputError("--depth is missing, expected one of those above");
+    }
     const bool turns = arguments.exif_orientation == "apply";
     auto [references, sources] = open_two(arguments.reference, arguments.source);
     for (StreamPointer* stream : {&references, &sources}) {

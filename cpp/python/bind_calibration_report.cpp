@@ -102,6 +102,7 @@ void bind_calibration_report(py::module_& m) {
     bind_lens_report(m);
     bind_adam_step(m);
     bind_lag_report(m);
+    // The model behind expected_error_map() is copied with it, but not pickled.
     ValueClass<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
         .def_readonly("verdict", &CalibrationReport::verdict, "Verdict.")
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")

@@ -81,7 +81,7 @@ def checkered(reference: Image, registered: Image, mask: NDArray[Any]) -> Pictur
 
 def red_cyan(reference: Image, registered: Image, mask: NDArray[Any]) -> Picture:
     """The reference in red, the registered source in cyan."""
-    return overlay(reference, registered, mask)
+    return overlay(reference, registered, np.where(mask != 0, 0, 1).astype(np.uint8))
 
 
 KINDS: dict[str, Callable[[Image, Image, NDArray[Any]], Picture]] = {

@@ -33,9 +33,8 @@ void each(const ImageView& numbers, const Use& use) {
     }
 }
 
-// Of those above 0, ascending; 0 where there are none.
+// Of those above 0, ascending.
 float share_of(const std::vector<float>& sorted, double share) {
-    if (sorted.empty()) return 0;
     return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
@@ -105,6 +104,8 @@ Image metres_of(const ImageView& numbers, const DepthUnits& units, const std::st
             take(x, y, number, number == kLargest);
         });
     else each<float>(numbers, [&](int x, int y, float number) { take(x, y, number, false); });
+    if (std::none_of(metres.pixels.begin(), metres.pixels.end(), [](float z) { return z > 0; }))
+        throw DecodeError(where + ": all depth is unknown, expected some pixels above 0 m");
     return metres;
 }
 
@@ -117,8 +118,7 @@ std::string units_line(const ImageView& numbers, const DepthUnits& units, const 
     std::sort(known.begin(), known.end());
     const double count = static_cast<double>(metres.pixels.size());
     std::string line = "depth: ";
-    line += known.empty() ? "none is known"
-                          : format("%.3g to %.3g m", share_of(known, 0.05), share_of(known, 0.95));
+    line += format("%.3g to %.3g m", share_of(known, 0.05), share_of(known, 0.95));
     line += " by " +
             unit_text(numbers, scale_of(numbers, units, where, is_png), units.is_disparity()) +
             (units.is_disparity() ? " of disparity" : "");
@@ -139,16 +139,15 @@ std::string units_line(const ImageView& numbers, const DepthUnits& units, const 
 }
 
 std::string depth_choices() {
-    return "--depth is missing, expected one of:"
-           "\n  --depth FOLDER: a depth map for each reference image; measured depth is best"
-           "\n  --depth FOLDER --lidar-calibration FILE: lidar scans"
-           "\n  --depth stereo:FOLDER: images of a second, rectified visible camera"
-           "\n  --depth disparity:FOLDER: disparity maps, with --stereo-baseline and --stereo-focal"
-           "\n  --depth BAG#TOPIC: a depth camera's topic in a bag"
-           "\n  --depth MODEL.onnx: a monocular network, where nothing was measured (`xcalib models"
-           " list`)"
-           "\n  --depth plane: a flat road, for cameras on vehicles"
-           "\n  --depth METRES: one distance for all: benches, facades, drones, far scenes";
+    return "--depth FOLDER: a depth map for each reference image; measured depth is best\n"
+           "--depth FOLDER --lidar-calibration FILE: lidar scans\n"
+           "--depth stereo:FOLDER: images of a second, rectified visible camera\n"
+           "--depth disparity:FOLDER: disparity maps, with --stereo-baseline and --stereo-focal\n"
+           "--depth BAG#TOPIC: a depth camera's topic in a bag\n"
+           "--depth MODEL.onnx: a monocular network, where nothing was measured (`xcalib models"
+           " list`)\n"
+           "--depth plane: a flat road, for cameras on vehicles\n"
+           "--depth METRES: one distance for all: benches, facades, drones, far scenes";
 }
 
 }  // namespace xcalib

@@ -79,7 +79,9 @@ void add_lags(const LagReport& lag, const TimeOffset& offset, const Stream& all_
 }
 
 void distrust(const std::string& line, CalibrationResult& result) {
-    if (!line.empty()) result.distrust(line, "");
+    if (line.empty()) return;
+    const std::size_t end = line.find("; ");
+    result.distrust(line.substr(0, end), end == std::string::npos ? "" : line.substr(end + 2));
 }
 
 }  // namespace xcalib

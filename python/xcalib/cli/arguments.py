@@ -47,13 +47,13 @@ frames_arguments = options(
         help="Take arguments from a YAML file, by their names without dashes (reference, source,"
         " depth, ...); those given here go before.",
     ),
-    click.option(
-        "--dry-run",
-        is_flag=True,
-        help="Print what would be read, paired and written, and do no more.",
-    ),
 )
 
+dry_run_option = click.option(
+    "--dry-run",
+    is_flag=True,
+    help="Print what would be read, paired and written, and do no more.",
+)
 quiet_option = click.option("--quiet", is_flag=True, help="No progress bars.")
 threads_option = click.option(
     "--threads",
@@ -131,7 +131,8 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
 def open_frames(arguments: Mapping[str, Any], threads: int, rig: Rig | None) -> Frames:
     """Open what `frames_arguments` names, and print how frames were paired by time."""
     if arguments["depth_spec"] is None:
-        raise InputError(depth_choices())
+        click.echo(depth_choices(), err=True)
+        raise InputError("--depth is missing, expected one of those above")
     frames = Frames.open(inputs_of(arguments, threads), rig)
     for note in frames.notes:
         click.echo(note, err=True)

@@ -31,6 +31,7 @@ from .arguments import (
     WORDS,
     check_writes,
     colormap_option,
+    dry_run_option,
     frames_arguments,
     load_rig,
     open_frames,
@@ -125,6 +126,7 @@ def frames_again(arguments: list[str], lag: int) -> Frames:
 
 @click.command("calibrate", cls=Sectioned)
 @frames_arguments
+@dry_run_option
 @click.option(
     "-o",
     "--output",

@@ -6,7 +6,6 @@ import contextlib
 import errno
 import io
 import os
-import re
 import sys
 import traceback
 from pathlib import Path
@@ -39,10 +38,8 @@ def warn(message: str) -> None:
 
 def say(label: str, message: str) -> None:
     """One line on stderr, wherever that leads: a full disk behind it changes no exit code."""
-    # But for a list of options, each on a line of its own.
-    parts = [" ".join(part.split()) for part in re.split(r"\n  (?=--)", message)]
     with contextlib.suppress(OSError):
-        click.echo(f"{label}: " + "\n  ".join(parts), err=True)
+        click.echo(f"{label}: {' '.join(message.split())}", err=True)
 
 
 class ErrorsInOneLine(click.Group):

@@ -16,6 +16,7 @@ from .arguments import (
     COUNT,
     check_writes,
     colormap_option,
+    dry_run_option,
     frames_arguments,
     load_rig,
     open_frames,
@@ -36,6 +37,7 @@ from .sections import Sectioned
 )
 @rig_argument
 @frames_arguments
+@dry_run_option
 @click.option(
     "--width",
     metavar="PX",

@@ -11,6 +11,7 @@ from ..frames import check_output_writable
 from ..registration import RegistrationOptions, run_registration
 from .arguments import (
     WORDS,
+    dry_run_option,
     frames_arguments,
     given_files,
     load_rig,
@@ -31,6 +32,7 @@ from .sections import Sectioned
 )
 @rig_argument
 @frames_arguments
+@dry_run_option
 @click.option(
     "-o",
     "--output",

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-from ..evaluate import evaluate
+from ..evaluation import evaluate
 from ..frames import write_bytes
 from .charts import chart, lens_lines, rig_segments
 from .pictures import frame_pictures

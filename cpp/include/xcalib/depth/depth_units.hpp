@@ -32,7 +32,7 @@ double depth_unit_of(const std::string& word);
 
 // Metres of a map's numbers, uint16 or float32, one channel; 0 where unknown. `where` names the map
 // in messages; `is_png`: counts without a scale are of 1/256. Throws InputError where the unit is
-// not known.
+// not known, DecodeError where the depth of no pixel is.
 Image metres_of(const ImageView& numbers, const DepthUnits& units, const std::string& where,
                 bool is_png);
 
