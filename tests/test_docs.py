@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ import pytest
 import xcalib
 from bags import write_bag
 from conftest import ROOT, run
+from xcalib.convert import write_rig
 from xcalib.depth import read_depth
 from xcalib.frames import list_files, read_image
 
@@ -25,6 +27,7 @@ NOT_HERE = {
     "pip install": "the same",
     "cmake ": "the same",
     "python bench": "tests/test_bench.py and test_experiments.py run them",
+    "xcalib demo": "tests/test_cli.py runs it",
     "xcalib models fetch": "needs the network",
     ".onnx": "needs a network's file: tests/test_networks.py and test_flow.py",
     "--live": "needs cameras",
@@ -61,12 +64,40 @@ def snippets() -> Iterator[Any]:
                 yield pytest.param(text, id=f"{page.stem} {number}")
 
 
+def files_of_others(folder: Path, names: list[str]) -> None:
+    """The rig as other tools have it, labels of the visible images, and a report."""
+    rig = xcalib.Rig.load(folder / "rig.yaml")
+    write_rig(rig, folder / "camchain.yaml", "kalibr")
+    write_rig(rig, folder, "mrcal")
+    write_rig(rig, folder, "ros")
+    images = [
+        {"id": i, "file_name": name, "width": rig.reference.width, "height": rig.reference.height}
+        for i, name in enumerate(names)
+    ]
+    box = {"id": 1, "image_id": 0, "category_id": 1, "bbox": [100, 80, 40, 30]}
+    coco = {"images": images, "annotations": [box], "categories": [{"id": 1, "name": "car"}]}
+    (folder / "coco.json").write_text(json.dumps(coco))
+    (folder / "yolo").mkdir()
+    for name in names:
+        (folder / "yolo" / name).with_suffix(".txt").write_text("0 0.5 0.5 0.2 0.2\n")
+    footage = (folder / "visible", folder / "thermal", "--depth", folder / "depth")
+    small = ("--frames", 4, "--working-width", 160, "--quiet")
+    made = run(
+        *("calibrate", *footage, *small, "-o", folder / "fit.yaml"),
+        *("--report", folder / "report.json"),
+    )
+    assert made.exit_code in (0, 3), made.stderr
+
+
 @pytest.fixture(scope="module")
 def folder(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What the pages' commands find: footage of one small rig under all their names."""
     folder = tmp_path_factory.mktemp("docs")
     for name in ("visible", "thermal", "depth", "rig.yaml"):
         (folder / name).symlink_to(rendered / name)
+    (folder / "my_rig.yaml").symlink_to(rendered / "rig.yaml")
+    (folder / "data").symlink_to(rendered)
+    files_of_others(folder, [path.name for path in list_files(folder / "visible")])
     visible, thermal = (
         [read_image(path) for path in list_files(folder / name)] for name in ("visible", "thermal")
     )
@@ -78,6 +109,13 @@ def folder(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         halves[1] = cv2.cvtColor(halves[1], cv2.COLOR_GRAY2BGR)
         writer.write(np.hstack(halves))
     writer.release()
+    for name, images in (("visible", visible), ("thermal", thermal)):
+        size = images[0].shape[1::-1]
+        codec = cv2.VideoWriter.fourcc(*"mp4v")
+        writer = cv2.VideoWriter(str(folder / f"{name}.mp4"), codec, 10, size)
+        for image in images:
+            writer.write(image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
+        writer.release()
     topics = {"/visible/image_raw": ("bgr8", visible), "/thermal/image_raw": ("mono8", thermal)}
     bag = write_bag(folder / "bag", "mcap", topics)
     (folder / "drive.mcap").symlink_to(bag)
@@ -120,7 +158,8 @@ def test_printed_snippets_run(
 ) -> None:
     if ".onnx" in text and "PatchFlow" not in text:
         return  # tests/test_networks.py
-    (tmp_path / "drive.mp4").symlink_to(folder / "drive.mp4")
+    for path in folder.iterdir():
+        (tmp_path / path.name).symlink_to(path)
     monkeypatch.chdir(tmp_path)
     visible, thermal = (
         [read_image(path) for path in list_files(folder / name)] for name in ("visible", "thermal")
@@ -142,6 +181,9 @@ def test_printed_snippets_run(
         "depth_maps": depths[:3],
         "thermal_image": thermal[0],
         "depth_map": depths[0],
+        "rig": rig,
+        "points": np.array([[150.0, 100.0], [200.0, 140.0]]),
+        **{"left": 100, "top": 80, "right": 140, "bottom": 110},
         "reference": visible[0],
         "warped": warped,
         "mask": mask,

@@ -33,7 +33,7 @@ def test_the_wheel_holds_the_package_and_nothing_else() -> None:
     sources = {
         path.relative_to(root).as_posix()
         for path in root.rglob("*")
-        if path.is_file() and path.suffix in (".py", ".pyi", ".typed")
+        if path.is_file() and path.suffix in (".css", ".html", ".js", ".py", ".pyi", ".typed")
     }
     module = "_core" + sysconfig.get_config_var("EXT_SUFFIX")
     assert {path for path in inside if not path.endswith(".pyc")} == sources | {module}

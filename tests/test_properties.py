@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as npst
 from numpy.typing import NDArray
 
 from xcalib import Pinhole, Registrar, Rig
-from xcalib._core import natural_order, pair_times, read_file, read_npy, write_file
+from xcalib._core import natural_order, pair_times, read_array, read_file, write_file
 
 FEW = settings(max_examples=60, deadline=None)
 SIDES = st.integers(2, 40)
@@ -93,7 +93,7 @@ def test_arrays_are_read_as_numpy_reads_them(
     path = folder / "array.npy"
     np.save(path, np.asfortranarray(array) if fortran else array)
     with np.errstate(over="ignore"):
-        np.testing.assert_array_equal(read_npy(path), array.astype(np.float32))
+        np.testing.assert_array_equal(read_array(path, False), array.astype(np.float32))
 
 
 @FEW
@@ -102,7 +102,7 @@ def test_any_bytes_are_an_array_or_refused(folder: Path, data: bytes, head: bool
     path = folder / "bytes.npy"
     path.write_bytes((b"\x93NUMPY\x01\x00" if head else b"") + data)
     with pytest.raises(ValueError, match=r"bytes\.npy: "):
-        read_npy(path)
+        read_array(path, False)
 
 
 @FEW

@@ -499,7 +499,6 @@ def test_help_and_version(cli: Callable[..., Process]) -> None:
 ONLY_PYTHON = {
     *("--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"),
     *("--lidar-calibration", "--stereo-calibration"),
-    *("--stereo-baseline", "--stereo-focal", "--stereo-doffs"),
 }
 
 

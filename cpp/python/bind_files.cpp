@@ -94,7 +94,7 @@ to as it is. Raises InputError where that cannot be.)");
         [](const Path& partial, const Path& file) {
             sync_to_disk(partial);
             std::filesystem::rename(partial, file);
-            sync_to_disk(file.parent_path());
+            sync_to_disk(file.has_parent_path() ? file.parent_path() : Path("."));
         },
         py::arg("partial"), py::arg("file"), Unlocked(),
         "Gives a complete file, first made sure to be on the disk, its name.");

@@ -1333,7 +1333,8 @@ def as_stored(file: bytes) -> bytes:
 
 def header_size(file: str | PathLike[str]) -> tuple[int, int] | None:
     """(width, height) of a PNG or JPEG file by its header; None of others, and where it is not
-    whole."""
+    whole.
+    """
 
 def times_beside(files: Sequence[str | PathLike[str]], stream: Stream) -> list[float] | None:
     """Times of timestamps.csv or timestamps.txt beside the files of a stream, None where there

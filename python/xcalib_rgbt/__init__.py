@@ -13,7 +13,8 @@ from importlib import import_module, util
 def main() -> None:
     """Run the command, or say which other package stands in its place."""
     found = util.find_spec("xcalib")
-    if found is None or util.find_spec("xcalib._core") is None:
+    places = found.submodule_search_locations if found is not None else None
+    if not places or util.find_spec("xcalib._core") is None:
         place = found.origin if found is not None else "nowhere"
         print(
             f"error: the package `xcalib` that Python finds ({place}) is not that of xcalib-rgbt;"
