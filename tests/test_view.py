@@ -60,7 +60,9 @@ def test_a_recording_is_read_again(rendered: Path, tmp_path: Path) -> None:
     rig = Rig.load(rendered / "rig.yaml")
     for info in camera_infos(tmp_path / "a.mcap"):
         camera = rig.reference if "visible" in info.topic else rig.source
-        np.testing.assert_array_equal(info.K, camera.K)
+        K = np.array(camera.K)
+        K[0, 1] = 0  # which ROS cannot hold
+        np.testing.assert_array_equal(info.K, K)
         assert (info.width, info.height) == (camera.width, camera.height)
     folders = {
         kind: sorted((rendered / kind).iterdir()) for kind in ("visible", "thermal", "depth")

@@ -6,6 +6,7 @@ frame), /thermal/mask, camera_info of both cameras, and the pose between them on
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 
 from ._core import InputError, Rig, keep_file
 from .convert.format import NAMES
-from .convert.loss import TOLERANCE, held
+from .convert.loss import held
 from .convert.pose import reference_from_source, wxyz_of
 from .convert.ros import FORMAT, distortion
 from .frames import Image
@@ -42,7 +43,8 @@ def write_recording(frames: Iterator[Registered], rig: Rig, output: Path) -> tup
         raise InputError(
             f"{output}: recordings need the library rosbags, `pip install rosbags`"
         ) from None
-    rig, lines = held(rig, FORMAT.title, FORMAT.lenses, TOLERANCE)
+    # A recording is looked at, so that what ROS cannot hold is said, and no more.
+    rig, lines = held(rig, FORMAT.title, FORMAT.lenses, math.inf)
     store = get_typestore(Stores.ROS2_HUMBLE)
     messages = Messages(store, rig)
     output.parent.mkdir(parents=True, exist_ok=True)
