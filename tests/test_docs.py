@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,15 @@ def snippets() -> Iterator[Any]:
                 yield pytest.param(text, id=f"{page.stem} {number}")
 
 
+def lay_out(folder: Path, here: Path) -> None:
+    """Folders are linked, and files copied: commands write over them."""
+    for path in folder.iterdir():
+        if path.is_dir():
+            (here / path.name).symlink_to(path)
+        else:
+            shutil.copy(path, here / path.name)
+
+
 def files_of_others(folder: Path, names: list[str]) -> None:
     """The rig as other tools have it, labels of the visible images, and a report."""
     rig = xcalib.Rig.load(folder / "rig.yaml")
@@ -93,9 +103,10 @@ def files_of_others(folder: Path, names: list[str]) -> None:
 def folder(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What the pages' commands find: footage of one small rig under all their names."""
     folder = tmp_path_factory.mktemp("docs")
-    for name in ("visible", "thermal", "depth", "rig.yaml"):
+    for name in ("visible", "thermal", "depth"):
         (folder / name).symlink_to(rendered / name)
-    (folder / "my_rig.yaml").symlink_to(rendered / "rig.yaml")
+    for name in ("rig.yaml", "my_rig.yaml"):
+        shutil.copy(rendered / "rig.yaml", folder / name)
     (folder / "data").symlink_to(rendered)
     files_of_others(folder, [path.name for path in list_files(folder / "visible")])
     visible, thermal = (
@@ -128,8 +139,7 @@ def test_printed_commands_run(
 ) -> None:
     if any(part in line for part in NOT_HERE):
         return
-    for path in folder.iterdir():
-        (tmp_path / path.name).symlink_to(path)
+    lay_out(folder, tmp_path)
     monkeypatch.chdir(tmp_path)
     words = shlex.split(re.sub(r"\s#\s.*", "", line))[1:]
     # They open, pair and choose all that they name; README's own are run to their end.
@@ -158,8 +168,7 @@ def test_printed_snippets_run(
 ) -> None:
     if ".onnx" in text and "PatchFlow" not in text:
         return  # tests/test_networks.py
-    for path in folder.iterdir():
-        (tmp_path / path.name).symlink_to(path)
+    lay_out(folder, tmp_path)
     monkeypatch.chdir(tmp_path)
     visible, thermal = (
         [read_image(path) for path in list_files(folder / name)] for name in ("visible", "thermal")
