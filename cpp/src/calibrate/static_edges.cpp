@@ -60,7 +60,7 @@ bool camera_stands_still(const WorkingImages& images) {
     return still_edges(images).share > kStandsStill;
 }
 
-WorkingImages without_static_edges(const WorkingImages& images, double& share) {
+WorkingImages without_static_edges(WorkingImages images, double& share) {
     constexpr std::size_t kFrames = 6;
     constexpr int kReach = 2;  // [px], as far as gradients and blur reach
     share = 0;
@@ -69,13 +69,12 @@ WorkingImages without_static_edges(const WorkingImages& images, double& share) {
     if (still == 0 || still > kStandsStill) return images;
     share = still;
 
-    WorkingImages out = images;
-    for (EdgeMap& edges : out.reference_edges)
+    for (EdgeMap& edges : images.reference_edges)
         for (int y = 0; y < mask.height; ++y)
             for (int x = 0; x < mask.width; ++x)
                 if (mask.any(x - kReach, y - kReach, x + kReach + 1, y + kReach + 1))
                     edges.z[static_cast<std::size_t>(y) * mask.width + x] = 0;
-    for (auto& [factor, level] : out.pyramid)
+    for (auto& [factor, level] : images.pyramid)
         for (Image& depth : level.depths) {
             // From a pixel of the level to those of the mask, which may be finer or coarser.
             const auto from = [&](int at, int level_size, int mask_size) {
@@ -89,7 +88,7 @@ WorkingImages without_static_edges(const WorkingImages& images, double& share) {
                                  from(y + 1, depth.height, mask.height) + kReach + 1))
                         depth.row(y)[x] = 0;
         }
-    return out;
+    return images;
 }
 
 }  // namespace xcalib

@@ -48,11 +48,14 @@ Baseline displaced(const Level& level, const Rig& rig, int num_threads) {
     return out;
 }
 
+// Deviations by which edges that agree stand out from displaced ones.
+constexpr double kContrast = 5.0;
+
 // Why a rig is not to be trusted, and what to do about it; none where it is.
 std::optional<Objection> objection(const CalibrationReport& report, const WorkingImages& images,
                                    const Rig& rig, const Halves& halves, const Plan& plan,
                                    const ErrorModel& model) {
-    constexpr double kContrast = 5.0, kShare = 0.05, kSameSign = 0.6;
+    constexpr double kShare = 0.05, kSameSign = 0.6;
     // Where two searches agree, flow would have to see much to know better: of few frames it is
     // itself wrong by that much.
     const double most_shift = halves.independent ? 6.0 : 3.0;
@@ -160,7 +163,7 @@ void judge(const WorkingImages& images, const Level& finest, const Rig& rig, con
     verdict.frames = static_cast<int>(images.size());
     verdict.date = today();
     verdict.software = this_software();
-    verdict.found = agree(halves, images) && (halves.independent || report.contrast >= 5.0);
+    verdict.found = agree(halves, images) && (halves.independent || report.contrast >= kContrast);
     report.errors = std::make_shared<const ErrorModel>(images, finest, rig, halves, plan);
     const ErrorModel& model = *report.errors;
     report.weak_directions = model.weak_directions();

@@ -11,7 +11,7 @@ from ..convert import FORMATS, TOLERANCE, read_rig, write_rig
 from ..convert.maps import MAPS, write_maps
 from ..frames import InputError
 from .errors import warn
-from .options import Input, number
+from .options import Input, number, output_option
 
 
 def size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
@@ -26,14 +26,7 @@ def size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple
 
 @click.command("convert", short_help="Rigs from and to other tools' files; maps as flow.")
 @click.argument("files", metavar="FILE...", type=Input(), nargs=-1, required=True)
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT",
-    type=Input(),
-    required=True,
-    help="File to write, or folder, where the format has several.",
-)
+@output_option("File to write, or folder, where the format has several.")
 @click.option(
     "--from",
     "from_format",

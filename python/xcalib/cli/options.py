@@ -67,6 +67,11 @@ def number(
     )
 
 
+def output_option(text: str) -> Callable[[Command], Command]:
+    """``-o``, of a command that tells by the name what it writes, and checks it then."""
+    return click.option("-o", "--output", metavar="OUT", type=Input(), required=True, help=text)
+
+
 def file(flag: str, text: str) -> Callable[[Command], Command]:
     """An option that takes a file."""
     return click.option(flag, metavar="FILE", type=Input(), help=text)

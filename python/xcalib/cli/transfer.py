@@ -33,7 +33,7 @@ from .arguments import (
     threads_option,
 )
 from .errors import NOT_TRUSTED, require_trusted, stop
-from .options import Input
+from .options import Input, output_option
 
 
 @click.command("transfer", short_help="Carry labels from one camera's images to the other's.")
@@ -54,14 +54,7 @@ from .options import Input
     show_default=True,
     help="Whose images get the labels; they are the other's.",
 )
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT",
-    type=Input(),
-    required=True,
-    help="File to write, or folder, of the same kind as LABELS.",
-)
+@output_option("File to write, or folder, of the same kind as LABELS.")
 @threads_option
 @quiet_option
 def command(

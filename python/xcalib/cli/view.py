@@ -23,20 +23,15 @@ from .arguments import (
     threads_option,
 )
 from .errors import require_trusted, warn
-from .options import Input
+from .options import output_option
 
 
 @click.command("view", short_help="Overlays of registered frames, or a recording for Foxglove.")
 @rig_argument
 @frames_arguments
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT",
-    type=Input(),
-    required=True,
-    help="Folder of images (.png), a video (.mp4, .avi, .mkv), or a recording with the cameras and"
-    " the registered images themselves, for Foxglove and ROS 2 (.mcap) or Rerun (.rrd).",
+@output_option(
+    "Folder of images (.png), a video (.mp4, .avi, .mkv), or a recording with the cameras and"
+    " the registered images themselves, for Foxglove and ROS 2 (.mcap) or Rerun (.rrd)."
 )
 @click.option(
     "--overlay",
