@@ -23,7 +23,7 @@
 namespace xcalib::cli {
 namespace {
 
-struct Arguments {
+struct CalibrateArguments {
     FrameArguments frames;
     std::string output, choose = "informed", colormap = "auto", initial, search = "auto",
                         mount = "auto", flow = "auto", solver = "ceres", tolerance = "2,5", report,
@@ -56,7 +56,7 @@ Pinhole intrinsics(const std::string& flag, const std::string& text) {
 }
 
 // The frames that say most about the rig.
-std::vector<int> choose_by_content(const Frames& frames, const Arguments& arguments,
+std::vector<int> choose_by_content(const Frames& frames, const CalibrateArguments& arguments,
                                    Console& console, RunFacts& run) {
     const std::vector<int> drawn =
         frames_to_look_at(frames.size(), arguments.options.max_frames, arguments.options.seed);
@@ -160,7 +160,7 @@ void look_at_lags(Frames& frames, LoadedFrames& loaded, const CalibrationOptions
     }
 }
 
-void check(const Arguments& a) {
+void check(const CalibrateArguments& a) {
     if (Path(a.report).extension() == ".html")
         throw InputError("--report " + a.report +
                          ": pages are written by the Python command, `xcalib`; expected a file of "
@@ -186,7 +186,7 @@ void check(const Arguments& a) {
     value_of("--flow", a.flow, flow_arguments());
 }
 
-void run(Arguments a, bool has_report, Console& console) {
+void run(CalibrateArguments a, bool has_report, Console& console) {
     check(a);
     CalibrationOptions& options = a.options;
     options.search.mode = value_of<SearchMode>("--search", a.search);
@@ -292,8 +292,8 @@ void add_calibrate(CLI::App& app, Console& console) {
     CLI::App* command = app.add_subcommand(
         "calibrate", "Estimate both cameras and their pose, and write a rig file.");
     command->footer("The rig is written even if it is not to be trusted (exit code 3).");
-    auto arguments = std::make_shared<Arguments>();
-    Arguments& a = *arguments;
+    auto arguments = std::make_shared<CalibrateArguments>();
+    CalibrateArguments& a = *arguments;
     add_frames(*command, a.frames);
     command->add_option("-o,--output", a.output, "Rig file to write (YAML).")
         ->type_name("RIG")
