@@ -36,8 +36,8 @@ SEED = click.IntRange(0, 2**32 - 1)
 COUNT = click.IntRange(1, 2**31 - 1)
 
 frames_arguments = options(
-    click.argument("reference", type=Input()),
-    click.argument("source", type=Input()),
+    click.argument("reference", type=Input(urls=True)),
+    click.argument("source", type=Input(urls=True)),
     *DEPTH_OPTIONS,
     *FOOTAGE_OPTIONS,
     click.option(

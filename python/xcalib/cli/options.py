@@ -15,15 +15,24 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class Input(click.Path):
-    """A file or a folder to read; an empty name would stand for the folder one is in."""
+    """A file or a folder to read; an empty name would stand for the folder one is in.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    urls
+        Whether what is behind a URL will do too; it stays text.
+    """
+
+    def __init__(self, urls: bool = False) -> None:
         super().__init__(path_type=Path)
+        self._urls = urls
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The name as a path."""
         if value == "":
             self.fail("the name is empty, expected a file or a folder", param, ctx)
+        if self._urls and "://" in str(value):
+            return str(value)
         return super().convert(value, param, ctx)
 
 

@@ -14,6 +14,7 @@ from .arguments import (
     dry_run_option,
     frames_arguments,
     given_files,
+    inputs_of,
     load_rig,
     open_frames,
     print_plan,
@@ -25,6 +26,7 @@ from .arguments import (
 from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Output
 from .sections import Sectioned
+from .workers_options import require_all, workers_options
 
 
 @click.command(
@@ -62,6 +64,7 @@ from .sections import Sectioned
     help="Pixels hidden from the source by something nearer: not marked, marked in the mask, or"
     " black as well.",
 )
+@workers_options
 @threads_option
 @quiet_option
 def command(
@@ -71,6 +74,8 @@ def command(
     overwrite: bool,
     nearest: bool,
     occlusion: str,
+    workers: int,
+    scheduler: str | None,
     threads: int,
     quiet: bool,
     dry_run: bool,
@@ -89,9 +94,21 @@ def command(
         return
     how = RegistrationOptions(threads, overlays, nearest, occlusion, overwrite)
     reads = [rig_file, *given_files(inputs)]
-    total = run_registration(frames, rig, output, how, inputs, quiet, reads)
-    click.echo(f"{total.summary()}: {output}")
-    say_depth(frames)
-    if not total.valid:
+    if workers or scheduler:
+        from ..batch import open_workers, register
+
+        with open_workers(scheduler, workers) as several:
+            opened = inputs_of(inputs, threads)
+            done = register(opened, rig, output, how, several, None, frames, inputs, reads, quiet)
+        click.echo(f"{done.summary()}: {output}")
+        say_depth(frames)
+        require_all(done)
+        valid = done.valid
+    else:
+        total = run_registration(frames, rig, output, how, inputs, quiet, reads)
+        click.echo(f"{total.summary()}: {output}")
+        say_depth(frames)
+        valid = total.valid
+    if not valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")
     require_trusted(rig, rig_file)
