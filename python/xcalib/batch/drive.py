@@ -203,9 +203,9 @@ class Drive:
         )
 
     @property
-    def id(self) -> str:
-        """That of the shards' job."""
-        return self._job.id
+    def output(self) -> Path:
+        """Where it is written, from the root: what tells its shards from others'."""
+        return self._target.output
 
     def shards(self) -> Iterator[RegisterShard]:
         """What is to be run, one by one."""
