@@ -68,7 +68,13 @@ class Told(Workers):
     def slots(self) -> int:
         return self._slots
 
-    def submit(self, ticket: int, shard: Shard, avoid: Collection[str] = ()) -> None:
+    def submit(
+        self,
+        ticket: int,
+        shard: Shard,
+        avoid: Collection[str] = (),
+        beside: Collection[int] = (),
+    ) -> None:
         assert isinstance(shard, Numbers)
         names = [f"worker {index}" for index in range(self._slots)]
         worker = next(name for name in names if name not in avoid)

@@ -13,7 +13,7 @@ from typing import Any
 
 from .._core import InputError
 from .shard import Shard
-from .target import LocalTarget
+from .target import Target
 
 RIG, REPORT = "rig.yaml", "report.json"
 
@@ -27,11 +27,11 @@ class CalibrateShard(Shard):
     """That names in the arguments are as seen from."""
     last: str | None
     """Rig file to compare with."""
-    target: LocalTarget
+    target: Target
 
     def run(self) -> dict[str, Any]:
         """Calibrate, and write the rig and its report."""
-        final = self.target.folder
+        final = self.target.place
         with self.target.attempt() as folder:
             rig, report = folder / RIG, folder / REPORT
             self._call("xcalib", "calibrate", "-o", str(rig), "--report", str(report), "--quiet",
@@ -40,7 +40,7 @@ class CalibrateShard(Shard):
             if self.last is not None:
                 told = self._call("xcalib.batch.drift", str(report), self.last)
                 moved = json.loads(told)
-            text = report.read_text("utf-8").replace(json.dumps(str(folder))[1:-1], str(final))
+            text = report.read_text("utf-8").replace(json.dumps(str(folder))[1:-1], final)
             report.write_text(text, "utf-8")
             self.target.publish(folder, {RIG: RIG, REPORT: REPORT})
         return {**result_of(json.loads(text)), "drift": moved}

@@ -15,7 +15,7 @@ from .._core import InputError
 from .shard import VERSION, Outcome, Shard, run_shard
 from .workers import Done, Gone, Workers, WorkersGone
 
-ANSWER = 8.0
+ANSWER = 6.0
 """For a scheduler to answer, and for a worker to be there [s]."""
 RETURN = 60.0
 """For both to come back after they were lost [s]."""
@@ -102,10 +102,16 @@ class DaskWorkers(Workers):
                     self._slots = sum(self._client.nthreads().values())
         return self._slots
 
-    def submit(self, ticket: int, shard: Shard, avoid: Collection[str] = ()) -> None:
+    def submit(
+        self,
+        ticket: int,
+        shard: Shard,
+        avoid: Collection[str] = (),
+        beside: Collection[int] = (),
+    ) -> None:
         if self._client.status != "running":
             self._reconnect()
-        others = [w for w in self._client.nthreads() if w not in avoid] if avoid else []
+        others = self._others(avoid, beside) if avoid or beside else []
         future = self._client.submit(
             run_shard,
             shard,
@@ -116,6 +122,11 @@ class DaskWorkers(Workers):
         )
         self._futures[ticket] = future
         future.add_done_callback(lambda ended: self._note(ticket, ended))
+
+    def _others(self, avoid: Collection[str], beside: Collection[int]) -> list[str]:
+        keys = {self._futures[ticket].key for ticket in beside if ticket in self._futures}
+        at_it = {w for w, running in self._client.processing().items() if keys & set(running)}
+        return [w for w in self._client.nthreads() if w not in at_it and w not in avoid]
 
     def _note(self, ticket: int, future: Any) -> None:
         outcome: Outcome | Gone = Gone(is_blamed=False)

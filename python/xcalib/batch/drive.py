@@ -26,9 +26,10 @@ from ..progress import Lines
 from ..registration import PART_FRAMES, RegistrationOptions, described, is_word, run_registration
 from ..remote import is_url
 from .engine import Lost, run_shards
+from .manifest import JournalManifest, Manifest, ObjectManifest, begun
 from .register_shard import RegisterJob, RegisterShard
 from .shard import Outcome, Shard
-from .target import LocalTarget
+from .target import LocalTarget, target_of
 from .terminated import terminated_is_interrupted
 from .units import Unit
 from .workers import InThisProcess, Workers, WorkersGone, threads_of
@@ -103,7 +104,8 @@ def register(
     Parameters
     ----------
     output
-        A folder, or a video by its suffix; what an earlier run made of it is kept.
+        A folder, also behind a URL, or a video by its suffix; what an earlier run made of it is
+        kept.
     options
         ``threads`` are those of one shard; 0: this machine's, shared among its workers.
     workers
@@ -170,14 +172,30 @@ class Drive:
         self._frames = frames or Frames.open(inputs, rig)
         self._made_of = described(made_of_inputs(inputs) if made_of is None else made_of)
         self._other_reads = list(other_reads)
-        self._target = LocalTarget(Path(output).absolute())
-        self._ledger = Ledger(
-            *(self._frames.references, self._frames.sources, self._frames.depth),
-            Registrar(rig, 1, options.nearest, options.occlusion),
-            *(self._target.output, options.overlays, options.overwrite),
-            *(self._made_of, self._other_reads, encoder),
-        )
-        self._names, there = self._ledger.names, self._ledger.there
+        self._target = target_of(output)
+        how = options
+
+        def open_ledger(output: Path) -> Ledger:
+            return Ledger(
+                self._frames.references,
+                self._frames.sources,
+                self._frames.depth,
+                Registrar(rig, 1, how.nearest, how.occlusion),
+                output,
+                how.overlays,
+                how.overwrite,
+                self._made_of,
+                self._other_reads,
+                encoder,
+            )
+
+        if isinstance(self._target, LocalTarget):
+            ledger = open_ledger(self._target.output)
+            self._manifest: Manifest = JournalManifest(ledger)
+        else:
+            ledger = begun(open_ledger)
+            self._manifest = ObjectManifest(self._target.url, ledger.made_with, options.overwrite)
+        self._names, there = ledger.names, self._manifest.there
         self._missing = [index for index, (key, _) in enumerate(self._names) if key not in there]
         self._wanted = {self._names[index][0] for index in self._missing}
         self._ranges: list[tuple[int, int]] = []
@@ -187,18 +205,19 @@ class Drive:
             size = shard_frames or shard_size(len(self._missing), workers.slots)
             self._ranges = ranges_of(self._missing, size)
         self._job = RegisterJob(
-            fingerprint("\n".join((str(self._ledger.made_with), *(k for k, _ in self._names)))),
+            fingerprint("\n".join((str(ledger.made_with), *(k for k, _ in self._names)))),
             resolved(inputs, self._frames),
             rig,
             dataclasses.replace(self._options, overwrite=False),
             frame_rate(self._frames.references),
             self._target,
         )
-        grid = self._ledger.rig.reference
+        grid = ledger.rig.reference
+        keys = {key for key, _ in self._names}
         self.total = Registered(
             len(self._names),
             earlier=len(self._names) - len(self._missing),
-            valid=sum(there.values()),
+            valid=sum(valid for key, valid in there.items() if key in keys),
             pixels=grid.width * grid.height * len(self._names),
         )
 
@@ -210,7 +229,7 @@ class Drive:
     def shards(self) -> Iterator[RegisterShard]:
         """What is to be run, one by one."""
         if self._ranges:
-            self._ledger.claim()
+            self._manifest.claim()
             self._target.begin()
         for first, stop in self._ranges:
             yield RegisterShard.of(self._job, first, stop, self._names)
@@ -230,7 +249,7 @@ class Drive:
             total.missing.append((shard.name, shard.stop - shard.start, outcome.reason))
             return
         units = [Unit.from_json(unit) for unit in outcome.result["units"]]
-        self._ledger.append([(unit.frames, unit.files) for unit in units])
+        self._manifest.note(shard.id, units)
         made = [v for unit in units for key, v in unit.frames if key in self._wanted]
         self._wanted.difference_update(key for unit in units for key, _ in unit.frames)
         total.made += len(made)
@@ -242,7 +261,7 @@ class Drive:
         """Let go of the output: no shard can write to it any more."""
         if self._ranges:
             self._target.end()
-        self._ledger.close()
+        self._manifest.close()
         self.total.seconds = time.perf_counter() - self._start
 
     def finish(self) -> None:
@@ -261,7 +280,7 @@ class Drive:
             depth=PickedDepth(self._frames.depth, kept),
         )
         run_registration(
-            *(some, self._rig, self._target.output, self._job.options, dict(self._made_of), True),
+            *(some, self._rig, self.output, self._job.options, dict(self._made_of), True),
             *(self._other_reads, self._job.rate),
         )
         total.seconds = time.perf_counter() - self._start

@@ -93,7 +93,7 @@ class _Run:
             self._submit(tried)
             if self._is_suspect(tried):
                 break
-        if len(self._under_way) < self._workers.slots and self._is_out and not self._again:
+        if len(self._under_way) < most and self._is_out and not self._again:
             self._double()
         return bool(self._under_way) or not self._is_out
 
@@ -114,10 +114,11 @@ class _Run:
 
     def _submit(self, tried: _Tried) -> None:
         self._tickets += 1
+        beside = list(tried.tickets)
         tried.tickets.add(self._tickets)
         tried.since = time.monotonic()
         self._under_way[self._tickets] = tried
-        self._workers.submit(self._tickets, tried.shard, tried.avoid)
+        self._workers.submit(self._tickets, tried.shard, tried.avoid, beside)
 
     def _double(self) -> None:
         """Run the slowest shard a second time; whichever ends first counts."""

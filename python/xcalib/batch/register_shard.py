@@ -24,7 +24,7 @@ from ..pipeline import Frames
 from ..registration import RegistrationOptions
 from .frames_of import opened_once
 from .shard import Shard, this_worker
-from .target import LocalTarget
+from .target import Target
 from .units import Unit, placed, units_of
 
 
@@ -39,7 +39,7 @@ class RegisterJob:
     options: RegistrationOptions
     rate: float
     """Of a video [frames/s], which a few of its frames do not tell."""
-    target: LocalTarget
+    target: Target
 
     def frames(self) -> Frames:
         """The footage, opened once in a worker."""

@@ -14,16 +14,17 @@ from typing import Any
 
 from .._core import InputError, Rig, Tolerance, fingerprint, frame_names, read_file
 from ..convert import is_foreign, read_rig
-from ..frames import write_bytes
 from ..pipeline import Frames
 from ..registration import RegistrationOptions
 from .calibrate_shard import RIG, CalibrateShard
 from .drive import Drive, Registered
 from .engine import Lost, run_shards
 from .jobs import Job
+from .manifest import ObjectLock
 from .register_shard import RegisterShard
 from .shard import VERSION, Outcome, Shard
-from .target import LocalTarget
+from .store import Place, is_there, join, local, read, write
+from .target import target_of
 from .terminated import terminated_is_interrupted
 from .workers import Workers, WorkersGone, threads_of
 
@@ -47,13 +48,13 @@ class DriveState:
     """What became of a job so far."""
 
     job: Job
-    folder: Path
+    folder: Place
     failure: str = ""
     """Why it was given up."""
     is_input: bool = False
     """Whether that is for what the user gave."""
     calibration: dict[str, Any] | None = None
-    rig: Path | None = None
+    rig: Place | None = None
     """That it is registered by."""
     registered: Registered | None = None
     seconds: float = 0.0
@@ -108,12 +109,13 @@ def has_moved(calibration: dict[str, Any] | None) -> bool:
     return bool(drift["median_px"] > tolerance.median or drift["p95_px"] > tolerance.p95)
 
 
-def _is_trusted(file: Path) -> bool:
+def _is_trusted(file: Place) -> bool:
     verdict = _load(file).verdict
     return not verdict or bool(verdict.trusted)
 
 
-def _load(file: Path) -> Rig:
+def _load(place: Place) -> Rig:
+    file = local(place)
     return read_rig(file) if is_foreign(file) else Rig.load(file)
 
 
@@ -123,13 +125,13 @@ class Batch:
     def __init__(
         self,
         jobs: Sequence[Job],
-        output: Path,
+        output: Place,
         workers: Workers,
         threads: int = 0,
         overwrite: bool = False,
         say: Callable[[DriveState], None] = lambda _: None,
     ) -> None:
-        self.states = [DriveState(job, output / job.name) for job in jobs]
+        self.states = [DriveState(job, join(output, job.name)) for job in jobs]
         self._workers = workers
         self._threads = threads_of(workers, threads)
         self._overwrite = overwrite
@@ -184,12 +186,13 @@ class Batch:
         if job.rig is not None:
             made_of.append(fingerprint(read_file(job.rig)))
         ident = fingerprint("\n".join(made_of))
-        state.folder.mkdir(parents=True, exist_ok=True)
+        if isinstance(state.folder, Path):
+            state.folder.mkdir(parents=True, exist_ok=True)
         known = _noted_result(state.folder, ident)
         if known is not None and not self._overwrite:
             self._take_calibration(state, known)
             return
-        target = LocalTarget(state.folder.absolute())
+        target = target_of(state.folder)
         target.begin()
         name = f"{job.name}: calibration"
         shard = CalibrateShard(
@@ -200,7 +203,7 @@ class Batch:
 
     def _take_calibration(self, state: DriveState, result: dict[str, Any]) -> None:
         state.calibration = result
-        state.rig = state.folder / RIG if result["trusted"] else state.job.rig
+        state.rig = join(state.folder, RIG) if result["trusted"] else state.job.rig
         if state.job.register is None or state.rig is None:
             self._say(state)
 
@@ -218,11 +221,11 @@ class Batch:
         drive = Drive(
             job.inputs(),
             _load(state.rig),
-            state.folder / job.output,
+            join(state.folder, job.output),
             options,
             self._workers,
             made_of=inputs,
-            other_reads=[state.rig],
+            other_reads=[local(state.rig)],
         )
         state.drive = drive
         self._by_output[drive.output] = state
@@ -247,13 +250,13 @@ class Batch:
                     self._end(state)
             return
         state, ident = self._by_shard.pop(shard.id)
-        LocalTarget(state.folder.absolute()).end()
+        target_of(state.folder).end()
         if isinstance(outcome, Lost):
             self._give_up(state, outcome.reason, outcome.is_input)
             return
         state.seconds += outcome.seconds
         noted = json.dumps({"id": ident, "result": outcome.result}, indent=1)
-        write_bytes(state.folder / CALIBRATION, noted.encode())
+        write(join(state.folder, CALIBRATION), noted.encode())
         self._take_calibration(state, outcome.result)
 
     def _end(self, state: DriveState) -> None:
@@ -274,7 +277,7 @@ class Batch:
                 state.registered = state.drive.total
                 state.drive = None
             elif not self._is_calibrated(state):
-                LocalTarget(state.folder.absolute()).end()
+                target_of(state.folder).end()
 
     def gone(self, why: str) -> None:
         """No worker is left: what is not done is missing."""
@@ -291,7 +294,7 @@ class Batch:
 
 def run_batch(
     jobs: Sequence[Job],
-    output: Path,
+    output: Place,
     workers: Workers,
     threads: int = 0,
     overwrite: bool = False,
@@ -347,21 +350,25 @@ def urgency(state: DriveState) -> tuple[int, float, str]:
     return STATES.index(state.state), -(error or 0.0), state.job.name
 
 
-def _noted_result(folder: Path, ident: str) -> dict[str, Any] | None:
+def _noted_result(folder: Place, ident: str) -> dict[str, Any] | None:
     """What a calibration of the same id has found, if its files are there."""
     try:
-        noted = json.loads((folder / CALIBRATION).read_text("utf-8"))
-    except (OSError, ValueError):
+        noted = json.loads(read(join(folder, CALIBRATION)) or b"null")
+    except ValueError:
         return None
-    if not isinstance(noted, dict) or noted.get("id") != ident or not (folder / RIG).is_file():
+    if not isinstance(noted, dict) or noted.get("id") != ident:
         return None
     result = noted.get("result")
-    return result if isinstance(result, dict) else None
+    return result if isinstance(result, dict) and is_there(join(folder, RIG)) else None
 
 
 @contextlib.contextmanager
-def locked(output: Path) -> Iterator[None]:
+def locked(output: Place) -> Iterator[None]:
     """Hold the output of a batch alone."""
+    if not isinstance(output, Path):
+        with contextlib.closing(ObjectLock(output, LOCK)):
+            yield
+        return
     output.mkdir(parents=True, exist_ok=True)
     path = output / LOCK
     with path.open("a") as file:

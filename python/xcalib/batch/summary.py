@@ -15,6 +15,7 @@ from ..report.page import number
 from ..report.page import text_of as text_of_report
 from .calibrate_shard import REPORT, RIG
 from .run import STATES, DriveState
+from .store import is_there, join
 
 COLUMNS = (
     *("name", "state", "why", "trusted", "expected_median_px", "expected_p95_px"),
@@ -104,7 +105,9 @@ def as_page(states: Sequence[DriveState], title: str) -> bytes:
 
 def _links(state: DriveState) -> list[tuple[str, str]]:
     names = [RIG, REPORT, state.job.output]
-    return [(name, f"{state.job.name}/{name}") for name in names if (state.folder / name).exists()]
+    return [
+        (name, f"{state.job.name}/{name}") for name in names if is_there(join(state.folder, name))
+    ]
 
 
 def _text_of(name: str) -> str:

@@ -43,9 +43,15 @@ class Workers:
         """Shards that run at the same time."""
         return 1
 
-    def submit(self, ticket: int, shard: Shard, avoid: Collection[str] = ()) -> None:
-        """Have a shard run, not by the workers to avoid if there are others. May raise
-        `WorkersGone`.
+    def submit(
+        self,
+        ticket: int,
+        shard: Shard,
+        avoid: Collection[str] = (),
+        beside: Collection[int] = (),
+    ) -> None:
+        """Have a shard run, by a worker that is none of those to avoid and runs no shard of the
+        tickets beside it, if there is one. May raise `WorkersGone`.
         """
         raise NotImplementedError
 
@@ -63,7 +69,13 @@ class InThisProcess(Workers):
     def __init__(self) -> None:
         self._waiting: list[tuple[int, Shard]] = []
 
-    def submit(self, ticket: int, shard: Shard, avoid: Collection[str] = ()) -> None:
+    def submit(
+        self,
+        ticket: int,
+        shard: Shard,
+        avoid: Collection[str] = (),
+        beside: Collection[int] = (),
+    ) -> None:
         self._waiting.append((ticket, shard))
 
     def wait(self, seconds: float) -> list[Done]:
@@ -92,7 +104,13 @@ class OnExecutor(Workers):
     def slots(self) -> int:
         return self._slots
 
-    def submit(self, ticket: int, shard: Shard, avoid: Collection[str] = ()) -> None:
+    def submit(
+        self,
+        ticket: int,
+        shard: Shard,
+        avoid: Collection[str] = (),
+        beside: Collection[int] = (),
+    ) -> None:
         try:
             future = self._executor.submit(run_shard, shard)
         except BrokenExecutor:

@@ -172,7 +172,9 @@ def say_depth(frames: Frames) -> None:
         click.echo(frames.depth_line)
 
 
-def print_plan(frames: Frames, outputs: Sequence[Path | None], chosen: Sequence[int] = ()) -> None:
+def print_plan(
+    frames: Frames, outputs: Sequence[Path | str | None], chosen: Sequence[int] = ()
+) -> None:
     """What a run would read, pair, choose and write."""
     click.echo(plan_text(frames.references, frames.sources, frames.depth, list(chosen)))
     say_depth(frames)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..frames import check_folder_writable, write_bytes
+from ..frames import check_folder_writable
 from .arguments import quiet_option, threads_option
 from .errors import FAILED, NOT_TRUSTED, say, stop
 from .options import Input, Output
@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     metavar="DIR",
-    type=Output(check_folder_writable),
+    type=Output(check_folder_writable, urls=True),
     required=True,
-    help="Folder to write to: one of each drive, summary.csv, summary.json and index.html.",
+    help="Folder to write to, also behind a URL: one of each drive, summary.csv, summary.json and"
+    " index.html.",
 )
 @click.option(
     "--dry-run", is_flag=True, help="Read the file, say what would be done, and do no more."
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 @quiet_option
 def command(
     jobs: Path,
-    output: Path,
+    output: Path | str,
     dry_run: bool,
     overwrite: bool,
     workers: int,
@@ -62,6 +63,7 @@ def command(
     from ..batch.jobs import load_jobs
     from ..batch.run import FAILED as GIVEN_UP
     from ..batch.run import GOOD, run_batch
+    from ..batch.store import join, write
     from ..batch.summary import as_csv, as_json, as_page
 
     todo = load_jobs(jobs)
@@ -69,7 +71,7 @@ def command(
         for job in todo:
             calibrated = "calibrated" if job.calibrate is not None else f"by {job.rig}"
             done = "registered" if job.register is not None else "not registered"
-            click.echo(f"{job.name}: {calibrated}, {done}, into {output / job.name}")
+            click.echo(f"{job.name}: {calibrated}, {done}, into {join(output, job.name)}")
         return
 
     def tell(state: DriveState) -> None:
@@ -78,12 +80,12 @@ def command(
 
     with open_workers(scheduler, workers) as several:
         states, is_new = run_batch(todo, output, several, threads, overwrite, tell)
-    write_bytes(output / "summary.csv", as_csv(states))
-    write_bytes(output / "summary.json", as_json(states))
-    write_bytes(output / "index.html", as_page(states, f"Batch of {jobs.name}"))
+    write(join(output, "summary.csv"), as_csv(states))
+    write(join(output, "summary.json"), as_json(states))
+    write(join(output, "index.html"), as_page(states, f"Batch of {jobs.name}"))
     good = sum(state.state == GOOD for state in states)
     nothing = "" if is_new else "nothing to do: "
-    click.echo(f"{nothing}{good} of {len(states)} drives are good: {output / 'index.html'}")
+    click.echo(f"{nothing}{good} of {len(states)} drives are good: {join(output, 'index.html')}")
     given_up = [
         state
         for state in states

@@ -44,14 +44,19 @@ class Output(click.Path):
     check
         `_core.check_file_writable` or `_core.check_output_writable`. It sees the name as it was
         given: a `Path` has no slash at its end, and is never empty.
+    urls
+        Whether what is behind a URL will do too; it stays text.
     """
 
-    def __init__(self, check: Callable[[str], None]) -> None:
+    def __init__(self, check: Callable[[str], None], urls: bool = False) -> None:
         super().__init__(path_type=Path)
         self._check = check
+        self._urls = urls
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The name as a path."""
+        if self._urls and "://" in str(value):
+            return str(value)
         self._check(str(value))
         return super().convert(value, param, ctx)
 

@@ -39,7 +39,7 @@ from .workers_options import require_all, workers_options
     "-o",
     "--output",
     metavar="OUT",
-    type=Output(check_output_writable),
+    type=Output(check_output_writable, urls=True),
     required=True,
     help="Folder to write to: images under the reference's names, and masks/. Or a video: .mp4,"
     " .avi (8 bit), .mkv (without loss, gray also 16 bit), and its masks.",
@@ -69,7 +69,7 @@ from .workers_options import require_all, workers_options
 @quiet_option
 def command(
     rig_file: Path,
-    output: Path,
+    output: Path | str,
     overlays: bool,
     overwrite: bool,
     nearest: bool,
@@ -94,7 +94,7 @@ def command(
         return
     how = RegistrationOptions(threads, overlays, nearest, occlusion, overwrite)
     reads = [rig_file, *given_files(inputs)]
-    if workers or scheduler:
+    if workers or scheduler or isinstance(output, str):
         from ..batch import open_workers, register
 
         with open_workers(scheduler, workers) as several:
