@@ -461,6 +461,12 @@ def test_what_only_python_does_is_named(
     result = cli("calibrate", "visible", "thermal", *arguments, "-o", "r.yaml", cwd=rendered)
     assert result.returncode == 2
     assert named in result.stderr and "the Python command, `xcalib`" in result.stderr
+    many = cli(
+        *("register", "rig.yaml", "visible", "thermal", "--depth", "depth", "-o", "o"),
+        *("--scheduler", "tcp://localhost:1"),
+        cwd=rendered,
+    )
+    assert many.returncode == 2 and "--scheduler: several workers are used by the" in many.stderr
     bag = cli("evaluate", "rig.yaml", "a.mcap#/v", "thermal", "--depth", "plane", cwd=rendered)
     assert bag.returncode == 2 and "Python command" in bag.stderr
 
@@ -499,6 +505,7 @@ def test_help_and_version(cli: Callable[..., Process]) -> None:
 ONLY_PYTHON = {
     *("--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"),
     *("--lidar-calibration", "--stereo-calibration"),
+    *("--workers", "--scheduler"),
 }
 
 

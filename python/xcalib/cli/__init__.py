@@ -15,6 +15,7 @@ from .errors import ErrorsInOneLine, open_standard_streams
 from .options import ARGUMENTS
 
 COMMANDS = (
+    "batch",
     "calibrate",
     "convert",
     "demo",

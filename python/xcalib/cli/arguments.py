@@ -36,8 +36,8 @@ SEED = click.IntRange(0, 2**32 - 1)
 COUNT = click.IntRange(1, 2**31 - 1)
 
 frames_arguments = options(
-    click.argument("reference", type=Input()),
-    click.argument("source", type=Input()),
+    click.argument("reference", type=Input(urls=True)),
+    click.argument("source", type=Input(urls=True)),
     *DEPTH_OPTIONS,
     *FOOTAGE_OPTIONS,
     click.option(
@@ -125,6 +125,7 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
             threads,
         ),
         MeasuredDepth(**{field.name: a[field.name] for field in fields(MeasuredDepth)}),
+        (a["source_readout"] or 0.0, a["reference_readout"] or 0.0),
     )
 
 
@@ -194,7 +195,9 @@ def say_depth(frames: Frames) -> None:
         click.echo(frames.depth_line)
 
 
-def print_plan(frames: Frames, outputs: Sequence[Path | None], chosen: Sequence[int] = ()) -> None:
+def print_plan(
+    frames: Frames, outputs: Sequence[Path | str | None], chosen: Sequence[int] = ()
+) -> None:
     """What a run would read, pair, choose and write."""
     click.echo(plan_text(frames.references, frames.sources, frames.depth, list(chosen)))
     say_depth(frames)
