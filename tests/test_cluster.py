@@ -41,7 +41,7 @@ class Run:
 
     def __init__(self, cluster: Cluster, drive: Path, out: Path, *more: str) -> None:
         self.out = out
-        given = arguments(drive, out, "--scheduler", cluster.address, *more)
+        given = arguments(drive, out, "--scheduler", cluster.address, "--quiet", *more)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "xcalib", *given],
             stdout=subprocess.PIPE,
