@@ -167,7 +167,7 @@ cli: | test-packages ## the command without Python, into build/release/cpp/cli
 test-python: $(VENV)/.installed $(VENV)/.test-requires cli ## Python tests, on the installed package
 	cd tests && ../$(BIN)/python -m pytest -n auto --dist loadfile
 
-test-bad-inputs: $(VENV)/.installed $(VENV)/.test-requires cli ## each bad input on both commands
+test-bad-inputs: $(VENV)/.installed $(VENV)/.test-requires cli ## each bad input on both commands and the Python API
 	cd tests && XCALIB_ALL_ROWS=1 ../$(BIN)/python -m pytest -n auto bad_inputs
 
 # -- Figures --------------------------------------------------------------------------------------

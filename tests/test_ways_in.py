@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from xcalib._core import (
     read_times,
     times_of_names,
 )
+from xcalib.convert import is_foreign, read_rig
 from xcalib.depth import open_depth, read_depth
 from xcalib.footage import Matching, open_pairs, open_stream
 from xcalib.frames import DecodeError, InputError, list_files, read_image
@@ -356,6 +358,29 @@ def test_a_folder_of_radiometric_jpegs_is_both_cameras(flir: tuple[Path, Array, 
     assert any("radiometric JPEGs" in note for note in pairs.notes)
 
 
+def test_a_cameras_own_alignment_is_a_start(flir: tuple[Path, Array, Array], binary: Path) -> None:
+    folder, _, _ = flir
+    rig = read_rig(folder / "FLIR1.jpg")
+    assert (rig.reference.width, rig.source.width) == (320, 240)
+    # The thermal middle is off the visible one's, its edge 1 / 1.3 of half the width from there.
+    points = np.array([[159.5 + 12, 119.5 - 7], [159.5 + 12 - 160 / 1.3, 119.5 - 7]])
+    np.testing.assert_allclose(
+        rig.transfer(points, np.full(2, 50.0)), [[119.5, 89.5], [-0.5, 89.5]], atol=0.01
+    )
+    assert is_foreign(folder / "FLIR0.jpg")
+    (folder.parent / "none.jpg").write_bytes(cv2.imencode(".jpg", np.zeros((9, 9), np.uint8))[1])
+    with pytest.raises(InputError, match=r"none\.jpg: no rig file and no radiometric JPEG"):
+        read_rig(folder.parent / "none.jpg")
+    given = [folder, folder, "--depth", "5", "--dry-run", "-o", folder.parent / "new.yaml"]
+    for start, code in ((folder / "FLIR0.jpg", 0), (folder.parent / "none.jpg", 2)):
+        words = [*map(str, given), "--initial", str(start)]
+        command = [binary, "calibrate", *words]
+        cli = subprocess.run(command, capture_output=True, text=True, check=False)
+        python = run("calibrate", *words)
+        assert python.exit_code == cli.returncode == code, (python.stderr, cli.stderr)
+        assert python.stderr == cli.stderr
+
+
 def test_a_truncated_radiometric_jpeg_is_named(flir: tuple[Path, Array, Array]) -> None:
     folder, _, _ = flir
     path = folder / "FLIR0.jpg"
@@ -479,6 +504,26 @@ def test_arguments_in_a_file(folders: tuple[Path, Path], rig: Path) -> None:
     result = run("register", "--config", job)
     assert result.exit_code == 2
     assert "unknown key 'depht', expected rig, reference, source, depth," in result.stderr
+
+
+def test_view_transfer_and_report_take_a_file_and_run_dry(
+    folders: tuple[Path, Path], rig: Path, calibrated: tuple[Path, Any]
+) -> None:
+    job, out, page = (rig.parent / name for name in ("job.yaml", "look.mp4", "page.html"))
+    labels, report = rig.parent / "labels", calibrated[0] / "report.json"
+    labels.mkdir()
+    frames = f"rig: {rig}\nreference: {folders[0]}\nsource: {folders[1]}\ndepth: 7\n"
+    for command, text, first, last in (
+        ("view", f"{frames}output: {out}", "6 pairs:", f"would be written: {out}"),
+        ("transfer", f"{frames}output: new\nlabels: {labels}", "6 pairs:", f"labels: {labels}"),
+        ("report", f"run: {report}\noutput: {page}", "6 pairs:", f"would be written: {page}"),
+        ("report", f"run: {report}", f"would be printed: {report}", ""),
+    ):
+        job.write_text(text)
+        result = run(command, "--config", job, "--dry-run")
+        assert result.exit_code == 0, result.stderr
+        assert result.stdout.startswith(first) and last in result.stdout
+    assert not out.exists() and not page.exists()
 
 
 def test_a_dry_run_says_what_would_be_done(folders: tuple[Path, Path], rig: Path) -> None:

@@ -208,7 +208,7 @@ void run(CalibrateArguments a, bool has_report, Console& console) {
     Frames frames = open_frames(a.frames, initial, console);
     std::vector<Path> writes = {a.output};
     if (has_report) writes.emplace_back(a.report);
-    check_writes(writes, frames, {a.initial, a.frames.reference_times, a.frames.source_times});
+    check_writes(writes, frames, given_files(a.frames, a.initial));
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
 
     RunFacts run{"xcalib-cli", console.arguments, std::filesystem::current_path().string(), 0, {}};

@@ -40,9 +40,7 @@ StreamPointer given_images(const std::string& spec, const Frames& frames) {
 void run(const EvaluateArguments& a, bool has_json, Console& console) {
     const Rig rig = load_rig(a.rig, console);
     Frames frames = open_frames(a.frames, rig, console);
-    if (has_json)
-        check_writes({a.json_file}, frames,
-                     {a.rig, a.frames.reference_times, a.frames.source_times});
+    if (has_json) check_writes({a.json_file}, frames, given_files(a.frames, a.rig));
     if (a.frames.dry_run) return say_plan(frames, {a.json_file}, {}, console);
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
     const StreamPointer given = a.registered.empty() ? nullptr : given_images(a.registered, frames);

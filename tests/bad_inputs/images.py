@@ -37,11 +37,12 @@ def opened(name: str, reference: str, message: str, **files: Content) -> Row:
     )
 
 
-def tiff(bits: int, sample_format: int) -> bytes:
-    """A page of 48x36 pixels of any type, all 0."""
+def tiff(bits: int, sample_format: int | None) -> bytes:
+    """A page of 48x36 pixels of any type, all 0; None: the type is not said."""
     size = 48 * 36 * bits // 8
     values = {256: 48, 257: 36, 258: bits, 259: 1, 262: 1, 273: 200, 277: 1, 278: 36, 279: size}
-    values[339] = sample_format
+    if sample_format is not None:
+        values[339] = sample_format
     fields = [struct.pack("<HHIHH", tag, 3, 1, value, 0) for tag, value in sorted(values.items())]
     head = b"II" + struct.pack("<HIH", 42, 8, len(fields)) + b"".join(fields) + bytes(4)
     return head.ljust(200, b"\0") + bytes(size)
@@ -61,14 +62,8 @@ ROWS = [
     ),
     source("cut-bmp", encoded(".bmp", picture(48, 36, 5))[:30], f"thermal/0.bmp: {CANNOT}", ".bmp"),
     source(
-        "int32-tiff",
-        encoded(".tiff", picture(48, 36, 5).astype(np.int32)),
-        "thermal/0.tiff: pixels are int32, expected uint8, uint16 or float32",
-        ".tiff",
-    ),
-    source(
-        "uint32-tiff",
-        tiff(32, 1),
+        "uint32-tiff-unsaid",
+        tiff(32, None),
         "thermal/0.tiff: pixels are uint32, expected uint8, uint16 or float32",
         ".tiff",
     ),
@@ -179,6 +174,8 @@ ROWS = [
         "depth is uint8, expected floats",
         ".tiff",
     ),
+    depth("uint32-tiff", tiff(32, 1), "depth is uint32, expected floats in metres", ".tiff"),
+    depth("int32-tiff", tiff(32, 2), "depth is int32, expected floats in metres", ".tiff"),
     depth(
         "aspect",
         encoded(".png", np.full((48, 48), 999, np.uint16)),

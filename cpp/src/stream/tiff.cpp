@@ -53,6 +53,23 @@ std::string tiff_pixel_type(std::string_view data) {
     return kNames[format - 1] + std::to_string(bits);
 }
 
+bool put_as_signed(std::string& data) {
+    if (tiff_pixel_type(data) != "uint32") return false;
+    const bool big = data[0] == 'M';
+    const Numbers number(data, big);
+    const std::size_t page = number(4, 4);
+    for (std::size_t i = 0; i < number(page, 2); ++i) {
+        const std::size_t field = page + 2 + 12 * i;
+        // Of one channel: several are no image of counts.
+        if (number(field, 2) != kSampleFormat || number(field + 2, 2) != kShort ||
+            number(field + 4, 4) != 1)
+            continue;
+        data[field + (big ? 9 : 8)] = 2;
+        return true;
+    }
+    return false;
+}
+
 void put_full_page_first(std::string& data, const std::string& name) {
     const std::string_view order = std::string_view(data).substr(0, 2);
     const bool big = order == "MM";
