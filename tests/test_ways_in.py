@@ -363,10 +363,10 @@ def test_a_cameras_own_alignment_is_a_start(flir: tuple[Path, Array, Array], bin
     folder, _, _ = flir
     rig = read_rig(folder / "FLIR1.jpg")
     assert (rig.reference.width, rig.source.width) == (320, 240)
-    # The thermal middle is off the visible one's, its edge 1 / 1.3 of half the width from there.
-    points = np.array([[159.5 + 12, 119.5 - 7], [159.5 + 12 - 160 / 1.3, 119.5 - 7]])
+    # The thermal middle is off the visible one's, and the width takes 1 / 1.3 of the visible one's.
+    points = np.array([[159.5 + 12, 119.5 - 7], [159.5 + 12 - 100 / 240 * 320 / 1.3, 119.5 - 7]])
     np.testing.assert_allclose(
-        rig.transfer(points, np.full(2, 50.0)), [[119.5, 89.5], [-0.5, 89.5]], atol=0.01
+        rig.transfer(points, np.full(2, 50.0)), [[119.5, 89.5], [19.5, 89.5]], atol=0.01
     )
     assert is_foreign(folder / "FLIR0.jpg")
     (folder.parent / "none.jpg").write_bytes(cv2.imencode(".jpg", np.zeros((9, 9), np.uint8))[1])

@@ -13,7 +13,7 @@ from xcalib import CalibrationOptions, Rig, evaluate
 from xcalib.depth import DepthUnits
 from xcalib.footage import Matching
 from xcalib.inputs import Inputs
-from xcalib.pipeline import Frames, run_calibration, save_rig
+from xcalib.pipeline import Frames, run_calibration
 from xcalib.registration import RegistrationOptions, run_registration
 
 
@@ -55,13 +55,18 @@ def call_of(row: Row) -> Callable[[], object] | None:
     # What is not to be trusted is a result, and an empty name in `Path` is the folder one is in.
     if row.only == "cli" or name not in POSITIONAL or row.code == 3 or "" in words:
         return None
+    if any(word.startswith("-o=") for word in words):
+        return None
     try:
         given = Words(POSITIONAL[name]).parse_args(words)
     except NoCall:
         return None
     if name == "inspect":
         return lambda: Rig.load(given.rig)
-    if given.depth is None or (name != "evaluate" and given.o is None):
+    if given.depth is None or (name == "register" and given.o is None):
+        return None
+    # What a caller does with the result of a calibration is another call.
+    if name == "calibrate" and given.o != "new.yaml":
         return None
 
     def opened() -> Frames:
@@ -88,8 +93,6 @@ def call_of(row: Row) -> Callable[[], object] | None:
 
     def calibrated() -> object:
         initial = Rig.load(given.initial) if given.initial else None
-        result, _ = run_calibration(opened(), CalibrationOptions(num_threads=1), initial, True)
-        save_rig(result.rig, Path(given.o))
-        return result
+        return run_calibration(opened(), CalibrationOptions(num_threads=1), initial, True)
 
     return {"register": registered, "evaluate": evaluated, "calibrate": calibrated}[name]

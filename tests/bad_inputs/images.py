@@ -37,12 +37,11 @@ def opened(name: str, reference: str, message: str, **files: Content) -> Row:
     )
 
 
-def tiff(bits: int, sample_format: int | None) -> bytes:
-    """A page of 48x36 pixels of any type, all 0; None: the type is not said."""
+def tiff(bits: int, sample_format: int) -> bytes:
+    """A page of 48x36 pixels of any type, all 0."""
     size = 48 * 36 * bits // 8
     values = {256: 48, 257: 36, 258: bits, 259: 1, 262: 1, 273: 200, 277: 1, 278: 36, 279: size}
-    if sample_format is not None:
-        values[339] = sample_format
+    values[339] = sample_format
     fields = [struct.pack("<HHIHH", tag, 3, 1, value, 0) for tag, value in sorted(values.items())]
     head = b"II" + struct.pack("<HIH", 42, 8, len(fields)) + b"".join(fields) + bytes(4)
     return head.ljust(200, b"\0") + bytes(size)
@@ -62,9 +61,9 @@ ROWS = [
     ),
     source("cut-bmp", encoded(".bmp", picture(48, 36, 5))[:30], f"thermal/0.bmp: {CANNOT}", ".bmp"),
     source(
-        "uint32-tiff-unsaid",
-        tiff(32, None),
-        "thermal/0.tiff: pixels are uint32, expected uint8, uint16 or float32",
+        "uint64-tiff",
+        tiff(64, 1),
+        "thermal/0.tiff: pixels are uint64, expected uint8, uint16 or float32",
         ".tiff",
     ),
     source(
@@ -110,6 +109,8 @@ ROWS = [
     ),
     # -- folders and patterns
     opened("none", "none", "none: no such folder"),
+    opened("camera", "0", "0: no such folder; cameras are read by `xcalib-cli register --live`"),
+    opened("address", "rtsp://cam/1", "/cam/1: no such folder; cameras are read by"),
     opened("empty-name", "''", "REFERENCE"),
     opened("a-file", "rig.yaml", "rig.yaml is a file, expected a folder of"),
     opened("an-image", "visible/0.png", "visible/0.png is a file, expected a folder of"),

@@ -115,7 +115,10 @@ def raised(row: Row) -> str:
         return ""
     with pytest.raises((ValueError, OSError)) as caught:
         call()
-    message = str(caught.value)
+    error = caught.value
+    message = str(error)
+    if isinstance(error, OSError) and error.filename:
+        message = f"{error.filename}: {error.strerror}"
     assert row.message in message
     assert "\n" not in message
     return message

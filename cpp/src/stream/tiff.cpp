@@ -56,18 +56,30 @@ std::string tiff_pixel_type(std::string_view data) {
 bool put_as_signed(std::string& data) {
     if (tiff_pixel_type(data) != "uint32") return false;
     const bool big = data[0] == 'M';
-    const Numbers number(data, big);
-    const std::size_t page = number(4, 4);
-    for (std::size_t i = 0; i < number(page, 2); ++i) {
-        const std::size_t field = page + 2 + 12 * i;
-        // Of one channel: several are no image of counts.
-        if (number(field, 2) != kSampleFormat || number(field + 2, 2) != kShort ||
-            number(field + 4, 4) != 1)
-            continue;
-        data[field + (big ? 9 : 8)] = 2;
+    const std::size_t page = Numbers(data, big)(4, 4), count = Numbers(data, big)(page, 2);
+    const std::size_t end = page + 2 + 12 * count;
+    if (data.size() < end + 4) return false;
+    const auto text_of = [big](std::uint32_t value, std::size_t size) {
+        std::string text(size, '\0');
+        for (std::size_t i = 0; i < size; ++i)
+            text[big ? size - 1 - i : i] = static_cast<char>(value >> (8 * i) & 0xff);
+        return text;
+    };
+    std::size_t at = page + 2;  // of the field, or of where it is to be: tags rise
+    while (at < end && Numbers(data, big)(at, 2) < kSampleFormat) at += 12;
+    if (at < end && Numbers(data, big)(at, 2) == kSampleFormat) {
+        if (Numbers(data, big)(at + 4, 4) != 1) return false;  // several channels
+        data.replace(at + 8, 2, text_of(2, 2));
         return true;
     }
-    return false;
+    // One that does not say it: the page's directory goes to the end of the file, with the field.
+    const std::string before = data.substr(page + 2, at - page - 2);
+    const std::string behind = data.substr(at, end + 4 - at);
+    if (data.size() % 2) data += '\0';
+    data.replace(4, 4, text_of(static_cast<std::uint32_t>(data.size()), 4));
+    data += text_of(static_cast<std::uint32_t>(count + 1), 2) + before + text_of(kSampleFormat, 2) +
+            text_of(kShort, 2) + text_of(1, 4) + text_of(2, 2) + text_of(0, 2) + behind;
+    return true;
 }
 
 void put_full_page_first(std::string& data, const std::string& name) {

@@ -43,8 +43,8 @@ class Journal {
     Journal(const Journal&) = delete;
     Journal& operator=(const Journal&) = delete;
 
-    // Those of earlier runs whose files are all there, in the size that they were written. What this
-    // run notes is not kept: memory would grow with every frame.
+    // Those of earlier runs whose files are all there, in the size that they were written. What
+    // this run notes is not kept: memory would grow with every frame.
     const std::vector<Unit>& units() const { return units_; }
 
     // What it says that the output was made with, by name; empty where it says nothing of that.
