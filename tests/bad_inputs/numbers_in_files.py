@@ -48,6 +48,13 @@ ROWS = [
     of_rig("comma", "cx: 31.5", "cx: '31,5'", f"reference.cx = 31,5, {FINITE}"),
     of_rig("list", "fx: 60", "fx: [60]", f"(not a single value), {FINITE}"),
     of_rig("digits", "fx: 60", "fx: x" + "1" * 300, f"... (301 characters), {FINITE}"),
+    Row(
+        "rig-many-digits",
+        INSPECT,
+        "1.1111111111111112e+299 is not plausible",
+        files=rig("fx: 60", "fx: " + "1" * 300),
+        code=0,
+    ),
     of_rig("negative-focal", "fx: 60", "fx: -60", "reference: fx = -60"),
     of_rig("zero-focal", "fy: 60", "fy: 0", "reference: fy = 0"),
     of_rig(

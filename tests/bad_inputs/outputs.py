@@ -180,6 +180,12 @@ ROWS = [
         "json-nowhere", f"{EVALUATE} --json link", "link that leads nowhere", links={"link": "none"}
     ),
     Row("json-below-a-file", f"{EVALUATE} --json rig.yaml/x", "is a file, expected a folder"),
+    Row(
+        "json-pipe-unread",
+        f"{EVALUATE} --json pipe",
+        "cannot write to pipe: nobody reads this pipe",
+        pipes=("pipe",),
+    ),
     Row("json-proc", f"{EVALUATE} --json /proc/x.json", "cannot write to /proc: /proc: "),
     # -- calibrate
     Row(
