@@ -51,7 +51,7 @@ class Opened {
     Opened(const Path& file, int flags, const Path& named, const char* if_no_device = nullptr)
         : descriptor_(::open(file.c_str(), flags | O_CLOEXEC)) {
         if (descriptor_ < 0 && errno == ENXIO && if_no_device)
-            throw std::invalid_argument("cannot write to " + named.string() + ": " + if_no_device);
+            throw InputError("cannot write to " + named.string() + ": " + if_no_device);
         if (descriptor_ < 0) fail(errno, named);
     }
     ~Opened() { ::close(descriptor_); }
