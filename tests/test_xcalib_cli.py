@@ -495,9 +495,9 @@ def test_a_stereo_calibration_is_the_three_numbers(
     for path in list_files("depth"):
         depth = read_depth(path)
         with np.errstate(divide="ignore"):
-            disparity = np.where(depth > 0, 0.5 * 300 / depth - 2, np.nan).astype(np.float32)
+            disparity = np.where(depth > 0, 0.5 * 300 / depth - 0.1, np.nan).astype(np.float32)
         np.save(Path("disparity") / path.with_suffix(".npy").name, disparity)
-    Path("stereo.yaml").write_text("baseline: 0.5\nfocal: 300\ndoffs: 2\n")
+    Path("stereo.yaml").write_text("baseline: 0.5\nfocal: 300\ndoffs: 0.1\n")
     given = ("evaluate", "rig.yaml", "visible", "thermal", "--width", "80", "--depth")
     first, second = both(*given, "disparity:disparity", "--stereo-calibration", "stereo.yaml")
     plain = run(*given, "depth")

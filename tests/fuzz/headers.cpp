@@ -1,7 +1,6 @@
-#include "xcalib/stream/header.hpp"
-
 #include "fuzzed.hpp"
 #include "xcalib/footage/exif.hpp"
+#include "xcalib/stream/header.hpp"
 #include "xcalib/stream/tiff.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

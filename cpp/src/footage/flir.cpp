@@ -146,14 +146,16 @@ Rig flir_alignment(const FlirParts& parts, const std::string& name) {
     constexpr double kFieldOfView = 45 * 3.14159265358979323846 / 180;
     Rig rig;
     rig.reference = Pinhole::from_hfov(parts.visible_width, parts.visible_height, kFieldOfView);
-    // Visible px a thermal one: the thermal image takes 1 / real_to_ir of the visible one's width.
-    const double scale = parts.visible_width / (parts.real_to_ir * parts.width);
-    rig.source = {parts.width,
-                  parts.height,
-                  rig.reference.fx / scale,
-                  rig.reference.fy / scale,
-                  0.5 * (parts.width - 1) - parts.offset_x / scale,
-                  0.5 * (parts.height - 1) - parts.offset_y / scale};
+    // Thermal pixels of visible ones: the thermal image takes 1 / real_to_ir of the visible one's
+    // width, about its middle and the offset.
+    const double scale = parts.real_to_ir * parts.width / parts.visible_width;
+    const Eigen::Vector2d middle(0.5 * (parts.width - 1), 0.5 * (parts.height - 1));
+    const Eigen::Vector2d centre(0.5 * (parts.visible_width - 1) + parts.offset_x,
+                                 0.5 * (parts.visible_height - 1) + parts.offset_y);
+    Eigen::Matrix3d source_from_visible = Eigen::Vector3d(scale, scale, 1).asDiagonal();
+    source_from_visible.topRightCorner<2, 1>() = middle - scale * centre;
+    rig.source =
+        Pinhole::from_K(parts.width, parts.height, source_from_visible * rig.reference.K());
     return rig;
 }
 
