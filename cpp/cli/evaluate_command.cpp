@@ -38,11 +38,13 @@ StreamPointer given_images(const std::string& spec, const Frames& frames) {
 }
 
 void run(const EvaluateArguments& a, bool has_json, Console& console) {
+    const Readout readout = readout_of(a.frames);
     const Rig rig = load_rig(a.rig, console);
     Frames frames = open_frames(a.frames, rig, console);
     if (has_json) check_writes({a.json_file}, frames, given_files(a.frames, a.rig));
     if (a.frames.dry_run) return say_plan(frames, {a.json_file}, {}, console);
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
+    frames = with_straight_rows(std::move(frames), readout, rig);
     const StreamPointer given = a.registered.empty() ? nullptr : given_images(a.registered, frames);
     Evaluator evaluator(rig, a.width, a.threads);
     std::vector<std::string> files;

@@ -94,9 +94,20 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
         ->type_name("HOW")
         ->check(CLI::IsMember({"ignore", "apply"}))
         ->capture_default_str();
+    const auto readout = [&command](const char* flag, const char* camera, std::string& share) {
+        command
+            .add_option(flag, share,
+                        std::string("Rolling shutter of the ") + camera +
+                            ": the time from its first row to its last, as a share of that from"
+                            " frame to frame, 0 to 1; auto: calibrate finds it from what moves.")
+            ->type_name("SHARE")
+            ->capture_default_str();
+    };
+    readout("--source-readout", "source", arguments.source_readout);
+    readout("--reference-readout", "reference", arguments.reference_readout);
     group(command, "Footage and pairing",
           {"--pair", "--time-offset", "--max-gap", "--reference-times", "--source-times",
-           "--exif-orientation"});
+           "--exif-orientation", "--source-readout", "--reference-readout"});
 }
 
 }  // namespace

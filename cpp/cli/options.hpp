@@ -34,6 +34,7 @@ struct FrameArguments {
     std::optional<double> max_gap;
     std::string reference_times, source_times;
     std::string exif_orientation = "ignore";
+    std::string source_readout = "0", reference_readout = "0";
     bool dry_run = false;
 };
 

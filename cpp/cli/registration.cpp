@@ -70,7 +70,9 @@ MadeWith inputs_of(const FrameArguments& frames) {
             {"max_gap", text_of(frames.max_gap, "none")},
             {"reference_times", table_text(frames.reference_times)},
             {"source_times", table_text(frames.source_times)},
-            {"exif_orientation", frames.exif_orientation}};
+            {"exif_orientation", frames.exif_orientation},
+            {"source_readout", frames.source_readout},
+            {"reference_readout", frames.reference_readout}};
 }
 
 }  // namespace

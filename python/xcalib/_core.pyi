@@ -1559,6 +1559,71 @@ def joined_line(images: Iterable[NDArray[Any]], name: str) -> str:
     or side by side; else ''. name: REFERENCE or SOURCE.
     """
 
+class ReadoutFit:
+    """What fit_readout() found."""
+
+    @property
+    def share(self) -> float:
+        """Of the time from frame to frame."""
+    @property
+    def taken(self) -> float:
+        """To give to the option: at most 1."""
+    @property
+    def error(self) -> float:
+        """Standard error of the share."""
+    @property
+    def seen(self) -> bool:
+        """Whether there is one, and not by chance."""
+    @property
+    def shares(self) -> list[float]:
+        """That were tried."""
+    @property
+    def nec(self) -> list[list[float]]:
+        """Of each frame at each of the shares."""
+    def line(self, camera: str) -> str:
+        """In words."""
+
+def parse_readout(option: str, text: str) -> float | None:
+    """The share, 0 to 1, that an option says; None for 'auto'. Raises InputError."""
+
+def straightened(
+    sources: Stream,
+    source: float,
+    reference: float,
+    rig: Rig | None,
+    motion: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]],
+    nearest: bool = False,
+) -> Stream:
+    """Source frames whose rows are brought to the time of the reference's, as they are read.
+
+    source, reference: from the first row's reading to the last one's, in shares of the time
+    from frame to frame; both 0 give the stream itself. rig: which rows look the same way;
+    None: the rows of both, upright. motion: a function of two (H, W) uint8 frames that gives
+    (H, W, 2) float32 [px], where what the first shows stands in the second. nearest: pixels
+    are taken as they are, else cubic. Raises InputError where the frames do not follow each
+    other.
+    """
+
+def fit_readout(
+    references: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    partners: Sequence[int],
+    all_sources: Stream,
+    rig: Rig,
+    options: CalibrationOptions,
+    source: float,
+    reference: float,
+    of_reference: bool,
+    motion: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]],
+    progress: Callable[[float], None],
+) -> ReadoutFit:
+    """The readout of a camera, as the fit of rig to a dozen of the frames shows it.
+
+    partners: the indices of their sources in all_sources, as they were read. source,
+    reference: what is known of the readouts; what is found comes to that of the source, or of
+    the reference if of_reference.
+    """
+
 def frames_later(
     all_sources: Stream, partners: Sequence[int], lag: int
 ) -> tuple[list[int], list[int]]:

@@ -30,6 +30,9 @@ ROWS = [
             "--time-offset soon",
             "--time-offset inf",
             "--time-offset nan",
+            "--source-readout 2",
+            "--source-readout auto",
+            "--reference-readout soon",
             "--no-such-option",
             "--far",
         )

@@ -167,6 +167,28 @@ def with_scalar_sources(frames: Frames, colormap: str) -> Frames:
     return frames
 
 
+def with_straight_rows(
+    frames: Frames,
+    arguments: Mapping[str, Any],
+    rig: Rig | None,
+    nearest: bool = False,
+    may_be_auto: bool = False,
+) -> Frames:
+    """The frames straightened by the readouts given; ``auto`` is none, where it may be given."""
+    source, reference = arguments["source_readout"], arguments["reference_readout"]
+    if not may_be_auto and None in (source, reference):
+        camera = "source" if source is None else "reference"
+        raise click.UsageError(
+            f"--{camera}-readout auto: expected the share that calibrate has found"
+        )
+    if source is None and reference is None:
+        raise click.UsageError(
+            "--source-readout auto --reference-readout auto: only how they differ can be seen;"
+            " expected a share for one of them"
+        )
+    return frames.with_straight_rows(source or 0, reference or 0, rig, nearest)
+
+
 def say_depth(frames: Frames) -> None:
     """What the numbers of the depth maps were taken for, once it is known that they will do."""
     if frames.depth_line:

@@ -21,6 +21,7 @@ from .arguments import (
     rig_argument,
     say_depth,
     threads_option,
+    with_straight_rows,
 )
 from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Output
@@ -83,7 +84,7 @@ def command(
     Interrupted, the same command resumes: what is whole is not made again.
     """
     rig = load_rig(rig_file)
-    frames = open_frames(inputs, threads, rig)
+    frames = with_straight_rows(open_frames(inputs, threads, rig), inputs, rig, nearest)
     if dry_run:
         print_plan(frames, [output])
         return

@@ -76,6 +76,11 @@ def command(
     pixel. What is outside is left out; what is clipped, occluded or ambiguous is counted, and noted
     in COCO files.
     """
+    if inputs["source_readout"] != 0 or inputs["reference_readout"] != 0:
+        raise click.UsageError(
+            "--source-readout and --reference-readout go with images, not with labels; expected"
+            " neither"
+        )
     rig = load_rig(rig_file)
     frames = open_frames(inputs, threads, rig)
     check_writes([output], frames, inputs, rig_file, labels)

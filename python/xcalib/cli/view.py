@@ -23,6 +23,7 @@ from .arguments import (
     quiet_option,
     rig_argument,
     threads_option,
+    with_straight_rows,
 )
 from .errors import require_trusted, warn
 from .options import output_option
@@ -56,7 +57,7 @@ def command(
 ) -> None:
     """Show every SOURCE image on its REFERENCE image, to look at."""
     rig = load_rig(rig_file)
-    frames = open_frames(inputs, threads, rig)
+    frames = with_straight_rows(open_frames(inputs, threads, rig), inputs, rig)
     check_writes([output], frames, inputs, rig_file)
     suffix = output.suffix.lower()
     if suffix in (".mp4", ".avi", ".mkv", ".mcap", ".rrd"):
