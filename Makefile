@@ -115,12 +115,12 @@ sanitize: | test-packages ## C++ tests under the sanitizers: addresses and undef
 fuzz-packages: | test-packages
 	@scripts/install_packages.sh $(FUZZ_PACKAGES)
 FUZZ_SECONDS ?= 60
-FUZZ_TARGETS := depth_stream journal npy rig_file times_table tiff_stack video
+FUZZ_TARGETS := arrays depth_stream flir headers journal npy rig_file times_table tiff_stack video
 # A unit that takes over 10 s or 2 GB has failed too.
 fuzz: $(VENV)/.installed $(VENV)/.test-requires | fuzz-packages ## every reader of files under libFuzzer, a minute each
 	cmake --preset fuzz -DXCALIB_WERROR=$(WERROR)
 	cmake --build --preset fuzz
-	PYTHONPATH=tests/bad_inputs $(BIN)/python tests/fuzz/write_corpora.py build/fuzz/seeds
+	PYTHONPATH=tests:tests/bad_inputs $(BIN)/python tests/fuzz/write_corpora.py build/fuzz/seeds
 	for target in $(FUZZ_TARGETS); do \
 	    mkdir -p build/fuzz/corpus/$$target; \
 	    build/fuzz/tests/fuzz/fuzz_$$target -max_total_time=$(FUZZ_SECONDS) -timeout=10 -rss_limit_mb=2048 \
@@ -184,7 +184,7 @@ cli: | test-packages ## the command without Python, into build/release/cpp/cli
 test-python: $(VENV)/.installed $(VENV)/.test-requires cli ## Python tests, on the installed package
 	cd tests && ../$(BIN)/python -m pytest -n auto --dist loadfile
 
-test-bad-inputs: $(VENV)/.installed $(VENV)/.test-requires cli ## each bad input on both commands
+test-bad-inputs: $(VENV)/.installed $(VENV)/.test-requires cli ## each bad input on both commands and the Python API
 	cd tests && XCALIB_ALL_ROWS=1 ../$(BIN)/python -m pytest -n auto bad_inputs
 
 # -- Figures --------------------------------------------------------------------------------------

@@ -230,7 +230,7 @@ void run(CalibrateArguments a, bool has_report, Console& console) {
     Frames frames = open_frames(a.frames, initial, console);
     std::vector<Path> writes = {a.output};
     if (has_report) writes.emplace_back(a.report);
-    check_writes(writes, frames, {a.initial, a.frames.reference_times, a.frames.source_times});
+    check_writes(writes, frames, given_files(a.frames, a.initial));
     const Frames raw = with_scalar_sources(std::move(frames), a.colormap, console);
     frames = with_straight_rows(raw, readout, initial);
 

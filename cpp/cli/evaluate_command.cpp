@@ -41,9 +41,7 @@ void run(const EvaluateArguments& a, bool has_json, Console& console) {
     const Readout readout = readout_of(a.frames);
     const Rig rig = load_rig(a.rig, console);
     Frames frames = open_frames(a.frames, rig, console);
-    if (has_json)
-        check_writes({a.json_file}, frames,
-                     {a.rig, a.frames.reference_times, a.frames.source_times});
+    if (has_json) check_writes({a.json_file}, frames, given_files(a.frames, a.rig));
     if (a.frames.dry_run) return say_plan(frames, {a.json_file}, {}, console);
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
     frames = with_straight_rows(std::move(frames), readout, rig);

@@ -4,9 +4,11 @@
 #include <sstream>
 
 #include "depth.hpp"
+#include "flir_files.hpp"
 #include "footage.hpp"
 #include "motion.hpp"
 #include "xcalib/rig_file.hpp"
+#include "xcalib/stream/files.hpp"
 #include "xcalib/stream/oriented.hpp"
 #include "xcalib/stream/pairs.hpp"
 #include "xcalib/stream/plan.hpp"
@@ -14,6 +16,8 @@
 namespace xcalib::cli {
 
 Rig load_rig(const std::string& file, Console& console) {
+    const std::string suffix = lower_suffix(file);
+    if (suffix == ".jpg" || suffix == ".jpeg") return radiometric_alignment(file);
     const Rig rig = xcalib::load_rig(file);
     for (const std::string& line : implausible(rig)) console.warn(file + ": " + line);
     return rig;
@@ -56,6 +60,12 @@ Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& 
     frames.sources = picked(frames.all_sources, frames.partners);
     if (!said.empty()) console.note(said);
     return frames;
+}
+
+std::vector<std::filesystem::path> given_files(const FrameArguments& arguments,
+                                               const std::string& rig) {
+    return {rig, arguments.reference_times, arguments.source_times,
+            arguments.depth.stereo_calibration};
 }
 
 Readout readout_of(const FrameArguments& arguments, bool may_be_auto) {

@@ -1,6 +1,11 @@
 // Frames as the arguments of the commands name them.
 #pragma once
 
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "console.hpp"
 #include "options.hpp"
 #include "xcalib/camera.hpp"
@@ -18,6 +23,10 @@ Frames open_frames(const FrameArguments& arguments, const std::optional<Rig>& ri
 
 // The frames with false colour turned back to numbers, as the console says.
 Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& console);
+
+// The files that the arguments name, besides those of the frames; empty names among them.
+std::vector<std::filesystem::path> given_files(const FrameArguments& arguments,
+                                               const std::string& rig);
 
 // The readouts that the arguments give; 0 for `auto`, which is refused unless `may_be_auto`, and
 // then for one camera at most.

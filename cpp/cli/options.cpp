@@ -140,6 +140,11 @@ void add_rare_depth(CLI::App& command, DepthArguments& arguments) {
                     "Disparity: principal point of the right camera minus the left's [px]."
                     "  [default: 0]")
         ->type_name("PX");
+    command
+        .add_option("--stereo-calibration", arguments.stereo_calibration,
+                    "Disparity: YAML file with `baseline` [m], `focal` [px] and `doffs` [px].")
+        ->type_name("FILE")
+        ->check(kNamed);
     number("--completion-confidence", arguments.completion_confidence, "F",
            "Complete: filled pixels below this confidence stay unknown, 0 to 1.");
     add_python_only(
@@ -147,10 +152,10 @@ void add_rare_depth(CLI::App& command, DepthArguments& arguments) {
         {"--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"},
         "networks are run");
     add_python_only(command, {"--lidar-calibration"}, "lidar scans are read");
-    add_python_only(command, {"--stereo-calibration"}, "stereo calibrations are read");
     group(command, "Depth by a plane, a network, lidar or stereo",
           {"--camera-height", "--horizon", "--far", "--plane-hfov", "--plane-roll",
-           "--stereo-baseline", "--stereo-focal", "--stereo-doffs", "--completion-confidence"});
+           "--stereo-calibration", "--stereo-baseline", "--stereo-focal", "--stereo-doffs",
+           "--completion-confidence"});
 }
 
 const CLI::Validator kNamed(

@@ -20,6 +20,7 @@ namespace xcalib::cli {
 struct DepthArguments {
     std::string spec;
     DepthUnits units;
+    std::string stereo_calibration;  // a file with the three numbers of disparities
     PlaneDepth plane;
     bool steady = false, complete = false;
     double completion_confidence = kCompletionConfidence;

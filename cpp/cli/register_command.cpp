@@ -52,6 +52,7 @@ void run(RegisterArguments a, Console& console) {
     console.result({{"frames", totals.frames},
                     {"earlier", totals.earlier},
                     {"valid_share", share},
+                    {"not_finite_source_pixels", totals.not_finite},
                     {"frames_per_second", totals.made ? Json(totals.speed()) : Json(nullptr)},
                     {"output", a.output}});
     if (totals.valid == 0) throw NotTrusted("no pixel of " + a.output + " is valid; see its masks");

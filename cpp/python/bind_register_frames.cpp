@@ -129,6 +129,8 @@ void bind_register_frames(py::module_& m) {
         .def_readonly("made", &Registration::made, "That this run has made.")
         .def_readonly("valid", &Registration::valid, "Valid pixels of the frames of either.")
         .def_readonly("pixels", &Registration::pixels, "Of all frames.")
+        .def_readonly("not_finite", &Registration::not_finite,
+                      "Source pixels of the frames of this run that are no number: masked.")
         .def_readonly("seconds", &Registration::seconds, "That this run took so far.")
         .def_property_readonly(
             "busy",

@@ -1023,6 +1023,10 @@ class FlirParts:
     @property
     def offset_y(self) -> float:
         """The same, down."""
+    def alignment(self, name: str) -> Rig:
+        """The rig that the camera's own alignment is: a start, with a reference of 45 deg of field
+        of view. InputError, naming `name`, where the file does not say.
+        """
     def celsius(self, counts: NDArray[Any]) -> NDArray[float32] | None:
         """(H, W) float32, degrees Celsius of a black body; None where the file does not say."""
 
@@ -1661,6 +1665,11 @@ def with_full_page_first(data: bytes, name: str) -> bytes:
     thumbnail; InputError, naming the file, where several pages are of that size.
     """
 
+def as_signed(data: bytes) -> tuple[bool, bytes]:
+    """Whether a TIFF file has unsigned 32-bit pixels, and its bytes with these said to be signed,
+    as OpenCV decodes them.
+    """
+
 def video_line(name: str, times: Sequence[float], announced: float, rate: float) -> str:
     """A line where fewer frames were decoded than the header announces, though they reach to the
     end; else ''. InputError where the file ends early.
@@ -1721,6 +1730,9 @@ class Registration:
     @property
     def pixels(self) -> int:
         """Of all frames."""
+    @property
+    def not_finite(self) -> int:
+        """Source pixels of the frames of this run that are no number: masked."""
     @property
     def seconds(self) -> float:
         """That this run took so far."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frames import InputError
+from .onnx_messages import OPENING, RUNNING, in_words
 
 Array = NDArray[Any]
 
@@ -97,7 +98,7 @@ class Network:
         try:
             self._session = onnxruntime.InferenceSession(str(path), options, providers=wanted)
         except Exception as error:  # its exceptions have no common base
-            raise InputError(f"{path}: {_reason(str(error))}") from None
+            raise InputError(f"{path}: {in_words(str(error), OPENING)}") from None
         # ONNX Runtime falls back to the CPU in silence where a driver is missing.
         lost = set(wanted) - set(self._session.get_providers())
         if lost:
@@ -117,7 +118,9 @@ class Network:
             values = self._session.run(list(outputs), dict(feeds))
         except Exception as error:
             shapes = ", ".join(f"{name} {value.shape}" for name, value in feeds.items())
-            raise InputError(f"{self.path}: cannot run on {shapes}: {_brief(str(error))}") from None
+            raise InputError(
+                f"{self.path}: cannot run on {shapes}: {in_words(str(error), RUNNING)}"
+            ) from None
         return [np.asarray(value, np.float32) for value in values]
 
     def output(self, which: str | int) -> Tensor:
@@ -210,18 +213,3 @@ class ImageInput:
 def _tensor(node: Any) -> Tensor:
     shape = tuple(side if isinstance(side, int) and side > 0 else None for side in node.shape)
     return Tensor(node.name, shape, node.type)
-
-
-def _brief(message: str) -> str:
-    """What ONNX Runtime says, without its error codes."""
-    return message.split(" : ", 3)[-1].strip()
-
-
-def _reason(message: str) -> str:
-    if "External data" in message or "external data" in message:
-        return f"a file of its weights is missing or not readable beside it: {_brief(message)}"
-    if "not a registered function/op" in message:
-        return f"needs operators that ONNX Runtime does not have: {_brief(message)}"
-    if "INVALID_PROTOBUF" in message or "No graph was found" in message:
-        return "not an ONNX model, or truncated"
-    return f"ONNX Runtime cannot open it: {_brief(message)}"

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
+#include <cstring>
 #include <map>
 
 #include "base/format.hpp"
@@ -69,6 +71,25 @@ Rig fitted_to_images(const Rig& rig, const Frames& frames) {
     }
 }
 
+long not_finite_pixels(const ImageView& image) {
+    if (image.type != PixelType::f32) return 0;
+    constexpr std::uint32_t kExponent = 0x7f800000;  // all ones: infinite, or not a number
+    long count = 0;
+    for (int y = 0; y < image.height; ++y) {
+        const auto* row = image.row<float>(y);
+        for (int x = 0; x < image.width; ++x) {
+            bool found = false;
+            for (int c = 0; c < image.channels; ++c) {
+                std::uint32_t bits;
+                std::memcpy(&bits, &row[image.channels * x + c], sizeof bits);
+                found = found || (bits & kExponent) == kExponent;
+            }
+            count += found;
+        }
+    }
+    return count;
+}
+
 // A frame on its way; what no later stage needs is let go.
 struct Passing {
     Frame frame;
@@ -95,6 +116,7 @@ std::string Registration::summary() const {
     std::string text = std::to_string(frames) + " frames";
     if (earlier) text += format(" (%d from before)", earlier);
     text += format(", %.1f %% valid", pixels ? 100.0 * valid / pixels : 0.0);
+    if (not_finite) text += format(", %ld source pixels are not finite, masked", not_finite);
     if (made) text += format(", %.1f frames/s", speed());
     if (made && !busy.empty()) text += " with files, busy: " + percentages(busy);
     return text;
@@ -206,7 +228,7 @@ Registration register_frames(const Frames& frames, const Rig& rig,
 
     std::vector<Passing> passing(static_cast<std::size_t>(threads));
     std::atomic<int> made{0};  // by this run, as `valid` is of it
-    std::atomic<long> valid{0};
+    std::atomic<long> valid{0}, not_finite{0};
     const bool looks = options.overlays || frames.depth->looks_at_reference();
     // A stage by what it does with a frame on its way; `in_order` unless several may.
     const auto stage = [&](const char* name, bool concurrent, auto work) {
@@ -222,7 +244,9 @@ Registration register_frames(const Frames& frames, const Rig& rig,
               }),
         stage("decode", frames.sources->concurrent(),
               [&](Passing& p, int i) {
-                  if (missing[i]) p.frame.source = (*frames.sources)[i];
+                  if (!missing[i]) return;
+                  p.frame.source = (*frames.sources)[i];
+                  not_finite += not_finite_pixels(p.frame.source.view);
               }),
         stage("depth", frames.depth->concurrent(),
               [&](Passing& p, int i) { p.frame.depth = (*frames.depth)(i, p.frame.reference); }),
@@ -248,6 +272,7 @@ Registration register_frames(const Frames& frames, const Rig& rig,
     const auto look = [&](const BusyShares& busy) {
         total.made = made;
         total.valid = valid_before + valid;
+        total.not_finite = not_finite;
         total.busy = busy;
         total.seconds =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -35,18 +35,19 @@ WORDS = _option_words()
 SEED = click.IntRange(0, 2**32 - 1)
 COUNT = click.IntRange(1, 2**31 - 1)
 
+config_option = click.option(
+    "--config",
+    metavar="FILE",
+    expose_value=False,
+    help="Take arguments from a YAML file, by their names without dashes (reference, source,"
+    " depth, ...); those given here go before.",
+)
 frames_arguments = options(
     click.argument("reference", type=Input(urls=True)),
     click.argument("source", type=Input(urls=True)),
     *DEPTH_OPTIONS,
     *FOOTAGE_OPTIONS,
-    click.option(
-        "--config",
-        metavar="FILE",
-        expose_value=False,
-        help="Take arguments from a YAML file, by their names without dashes (reference, source,"
-        " depth, ...); those given here go before.",
-    ),
+    config_option,
 )
 
 dry_run_option = click.option(

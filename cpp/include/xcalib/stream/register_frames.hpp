@@ -36,6 +36,7 @@ struct Registration {
     int made = 0;          // that this run has made
     long valid = 0;        // pixels of the frames of either
     long pixels = 0;       // of all frames
+    long not_finite = 0;   // source pixels of the frames of this run that are no number
     double seconds = 0.0;  // that this run took so far
     BusyShares busy;       // of its stages
 
