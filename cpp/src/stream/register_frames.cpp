@@ -83,6 +83,17 @@ long not_finite_pixels(const ImageView& image) {
     return count;
 }
 
+// Nothing that is read is written to.
+void check_over_inputs(const Frames& frames, const std::vector<std::filesystem::path>& other_reads,
+                       const std::filesystem::path& output, const std::vector<FrameName>& names,
+                       bool overlays) {
+    std::vector<std::string> reads = files_of(frames);
+    for (const std::filesystem::path& file : other_reads) reads.push_back(file.string());
+    Writes writes{output_files(output, names, overlays), output_folders(output, overlays)};
+    writes.files.push_back(journal_of(output).string());
+    check_apart(reads, writes);
+}
+
 // A frame on its way; what no later stage needs is let go.
 struct Passing {
     Frame frame;
@@ -166,18 +177,14 @@ Registration register_frames(const Frames& frames, const Rig& rig,
                              const std::function<void(const Registration&)>& progress) {
     check_output_writable(output);
     const std::vector<FrameName> names = frame_names(frames);
-    const std::vector<std::filesystem::path> files = output_files(output, names, options.overlays);
-    std::vector<std::filesystem::path> reads = files_of(frames);
-    reads.insert(reads.end(), other_reads.begin(), other_reads.end());
-    Writes writes{files, output_folders(output, options.overlays)};
-    writes.files.push_back(journal_of(output));
-    check_apart(reads, writes);
+    check_over_inputs(frames, other_reads, output, names, options.overlays);
     check_alone(output);
     const ImageView reference = (*frames.references)[0].view, source = (*frames.sources)[0].view;
     const Rig sized = fitted(rig, reference.width, reference.height, source.width, source.height);
     Journal journal(journal_of(output), made_with(rig, output, options, command, inputs, codecs),
                     options.overwrite);
-    if (journal.is_new() && !options.overwrite) check_not_others(output, files);
+    if (journal.is_new() && !options.overwrite)
+        check_not_others(output, output_files(output, names, options.overlays));
     const std::unique_ptr<Sink> sink =
         open_sink(output, frame_rate(*frames.references), &journal, codecs, options.part_frames);
     const std::map<std::string, long> there = sink->begin(names);
