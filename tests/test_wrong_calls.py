@@ -321,7 +321,7 @@ def test_values_are_compared_copied_pickled_and_shown(name: str) -> None:
 def test_a_camera_of_a_matrix() -> None:
     lens = Lens("brown", [-0.3, 0.1, 0, 0])
     camera = Pinhole.from_K(64, 48, 2 * CAMERA.K, lens)  # of any scale, as homogeneous matrices are
-    assert camera.K == pytest.approx(CAMERA.K) and camera.lens == lens
+    assert pytest.approx(CAMERA.K) == camera.K and camera.lens == lens
     with pytest.raises(ValueError, match="fx"):
         Pinhole.from_K(64, 48, np.diag([-1.0, 1, 1]))
 
