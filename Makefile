@@ -34,7 +34,7 @@ CPP_FILES = $(shell find bench/cpp cpp examples tests -name '*.[ch]' -o -name '*
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
     $(shell find cmake cpp python -type f -not -path '*/__pycache__/*')
 
-.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 test-native test-bad-inputs sanitize fuzz kill-test packages \
+.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 test-cluster test-native test-bad-inputs sanitize fuzz kill-test packages \
     format stub clean
 help:
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
@@ -130,6 +130,9 @@ fuzz: $(VENV)/.installed $(VENV)/.test-requires | fuzz-packages ## every reader 
 KILLS ?= 100
 kill-test: $(VENV)/.installed $(VENV)/.test-requires cli ## runs killed at random moments, and resumed
 	$(BIN)/python tests/kills.py --kills $(KILLS)
+
+test-cluster: $(VENV)/.installed $(VENV)/.test-requires ## workers and schedulers that are killed, stopped, full, or of another version
+	cd tests && XCALIB_CLUSTER=1 ../$(BIN)/python -m pytest test_cluster.py
 
 test-native: | test-packages ## the registrar for this machine's instruction set alone, as some compile all they have
 	$(call preset,native)

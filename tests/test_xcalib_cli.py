@@ -461,6 +461,12 @@ def test_what_only_python_does_is_named(
     result = cli("calibrate", "visible", "thermal", *arguments, "-o", "r.yaml", cwd=rendered)
     assert result.returncode == 2
     assert named in result.stderr and "the Python command, `xcalib`" in result.stderr
+    many = cli(
+        *("register", "rig.yaml", "visible", "thermal", "--depth", "depth", "-o", "o"),
+        *("--scheduler", "tcp://localhost:1"),
+        cwd=rendered,
+    )
+    assert many.returncode == 2 and "--scheduler: several workers are used by the" in many.stderr
     bag = cli("evaluate", "rig.yaml", "a.mcap#/v", "thermal", "--depth", "plane", cwd=rendered)
     assert bag.returncode == 2 and "Python command" in bag.stderr
 
@@ -526,7 +532,7 @@ def test_help_and_version(cli: Callable[..., Process]) -> None:
 # What the Python command alone does, docs/cli.md.
 ONLY_PYTHON = {
     *("--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"),
-    "--lidar-calibration",
+    *("--lidar-calibration", "--workers", "--scheduler"),
 }
 
 

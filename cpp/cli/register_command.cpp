@@ -81,6 +81,7 @@ void add_register(CLI::App& app, Console& console) {
         ->type_name("OUT")
         ->required();
     command->add_flag("--overlay", a.options.overlays, "Also write red-cyan overlays/.");
+    add_python_only(*command, {"--workers", "--scheduler"}, "several workers are used");
     command->add_flag("--overwrite", a.options.overwrite,
                       "Start again from the first frame.  [default: go on where an interrupted run "
                       "of the same command"

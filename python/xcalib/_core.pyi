@@ -1488,6 +1488,16 @@ class Pairs:
 def is_video(output: str | PathLike[str]) -> bool:
     """Whether an output of this name is a video."""
 
+def frame_names(references: Stream, sources: Stream, depth: Any) -> list[tuple[str, str]]:
+    """(key, name) of each frame; the key changes with the files that the frame is made of: their
+    names, sizes and times.
+    """
+
+def frame_rate(references: Stream) -> float:
+    """Of a video of these frames [frames/s]: by the median of their times; 25 where they have
+    none.
+    """
+
 def journal_of(output: str | PathLike[str]) -> Path:
     """Where the journal of an output is: in the folder, or beside the video, named after it."""
 
@@ -1737,6 +1747,50 @@ class Registration:
     def summary(self) -> str:
         """At its end, in one line."""
 
+class Ledger:
+    """A registration that has begun, whose frames are registered elsewhere."""
+    def __init__(
+        self,
+        references: Stream,
+        sources: Stream,
+        depth: Any,
+        registrar: Registrar,
+        output: str | PathLike[str],
+        overlays: bool,
+        overwrite: bool,
+        inputs: Sequence[tuple[str, str]],
+        other_reads: Sequence[str | PathLike[str]],
+        codecs: object,
+    ) -> None:
+        """As register_frames() begins, with the same refusals: the journal of the output is held
+        until close().
+        """
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """(key, name) of all frames, in order."""
+    @property
+    def there(self) -> dict[str, int]:
+        """Valid pixels of the frames that an earlier run has written, by their keys."""
+    @property
+    def made_with(self) -> list[tuple[str, str]]:
+        """(name, text) of all that the output depends on, but for the frames."""
+    @property
+    def rig(self) -> Rig:
+        """The rig at the size of the images."""
+    def claim(self) -> None:
+        """Before the first file has its name: what is called as this output's files is of this
+        run.
+        """
+    def append(
+        self, units: Sequence[tuple[Sequence[tuple[str, int]], Sequence[tuple[str, int]]]]
+    ) -> None:
+        """Notes that files are whole, a unit (frames, files) for those that are whole only
+        together: frames (key, valid pixels), in order, and files (name from the journal's folder,
+        bytes).
+        """
+    def close(self) -> None:
+        """Lets go of the journal."""
+
 def register_frames(
     references: Stream,
     sources: Stream,
@@ -1751,6 +1805,7 @@ def register_frames(
     codecs: object,
     progress: Callable[[Registration], object],
     hold_interrupts: bool,
+    rate: float = 0.0,
 ) -> Registration:
     """Registers all frames that an earlier run has not written, and returns the Registration.
 
@@ -1761,5 +1816,6 @@ def register_frames(
     codecs: has encode_image(file, image), which returns bytes, encoder_name(), Encoder(file,
     target, first, rate) and join(parts, file, target, rate, check). progress(registration) is
     called in this thread after frames, and a few times a second. hold_interrupts: in the main
-    thread, SIGINT and SIGTERM end the run between two frames, by KeyboardInterrupt.
+    thread, SIGINT and SIGTERM end the run between two frames, by KeyboardInterrupt. rate: of a
+    video [frames/s]; 0: that of the references.
     """

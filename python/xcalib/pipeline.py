@@ -39,7 +39,7 @@ from .footage import Picked, Stream, TopicDepth, open_matched_depth, open_pairs
 from .footage.bag import clock_line
 from .footage.opening import PickedDepth
 from .frames import DecodeError, Image, InputError, fit_rig, size_of
-from .inputs import Inputs
+from .inputs import Inputs, with_local_names
 from .motion import motion_between
 from .progress import progress, stages_bar
 from .thermal import scalar_sources
@@ -71,6 +71,7 @@ class Frames:
         """Open and pair frames. With a ``rig`` an estimated clock offset is refined, see
         `Pairs.refine`.
         """
+        inputs = with_local_names(inputs)
         pairs = open_pairs(inputs.reference, inputs.source, inputs.matching)
 
         def open_depth(used: list[int]) -> DepthProvider:

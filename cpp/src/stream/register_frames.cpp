@@ -29,18 +29,12 @@ std::string percentages(const BusyShares& busy) {
     return text;
 }
 
-// Frames a second, by the median; 25 where the stream does not say.
-double frame_rate(const Stream& stream) {
-    const double period = stream.times ? median_period(*stream.times) : 0.0;
-    return period > 0 ? 1 / period : 25.0;
-}
-
 const char* text_of(bool value) { return value ? "yes" : "no"; }
 
 // All that an output depends on, but for the frames and how fast it is made.
-MadeWith made_with(const Rig& rig, const std::filesystem::path& output,
-                   const RegistrationOptions& options, const std::string& command,
-                   const MadeWith& inputs, Codecs& codecs) {
+MadeWith made_with_of(const Rig& rig, const std::filesystem::path& output,
+                      const RegistrationOptions& options, const std::string& command,
+                      const MadeWith& inputs, Codecs& codecs) {
     MadeWith text = {{"command", command},
                      {"xcalib", XCALIB_VERSION},
                      {"rig", fingerprint(rig)},
@@ -94,6 +88,19 @@ void check_over_inputs(const Frames& frames, const std::vector<std::filesystem::
     check_apart(reads, writes);
 }
 
+// The rig at the size of the images, which the first frame that can be decoded tells.
+Rig fitted_to_images(const Rig& rig, const Frames& frames) {
+    for (int i = 0;; ++i) {
+        try {
+            const ImageView reference = (*frames.references)[i].view;
+            const ImageView source = (*frames.sources)[i].view;
+            return fitted(rig, reference.width, reference.height, source.width, source.height);
+        } catch (const DecodeError&) {
+            if (i + 1 == frames.size()) throw;
+        }
+    }
+}
+
 // A frame on its way; what no later stage needs is let go.
 struct Passing {
     Frame frame;
@@ -101,6 +108,11 @@ struct Passing {
 };
 
 }  // namespace
+
+double frame_rate(const Stream& references) {
+    const double period = references.times ? median_period(*references.times) : 0.0;
+    return period > 0 ? 1 / period : 25.0;
+}
 
 double Registration::speed() const { return made / std::max(seconds, 1e-9); }
 
@@ -143,9 +155,9 @@ Registered registered(const Registrar& registrar, const Picture& reference, cons
 }
 
 std::vector<FrameName> frame_names(const Frames& frames) {
-    std::map<std::filesystem::path, std::string> stamps;
+    std::map<std::string, std::string> stamps;
     const auto stamp = [&stamps](const std::filesystem::path& file) {
-        std::string& text = stamps[file];
+        std::string& text = stamps[file.string()];
         if (text.empty())
             for (const std::string& part : file_stamp(file)) text += "\n" + part;
         return text;
@@ -169,33 +181,45 @@ std::vector<FrameName> frame_names(const Frames& frames) {
     return names;
 }
 
+BegunRegistration::BegunRegistration(const Frames& frames, const Rig& rig,
+                                     const std::filesystem::path& output,
+                                     const RegistrationOptions& options, const std::string& command,
+                                     const MadeWith& inputs,
+                                     const std::vector<std::filesystem::path>& other_reads,
+                                     Codecs& codecs) {
+    check_output_writable(output);
+    names = frame_names(frames);
+    check_over_inputs(frames, other_reads, output, names, options.overlays);
+    check_alone(output);
+    sized = fitted_to_images(rig, frames);
+    made_with = made_with_of(rig, output, options, command, inputs, codecs);
+    journal = std::make_unique<Journal>(journal_of(output), made_with, options.overwrite);
+    if (journal->is_new() && !options.overwrite)
+        check_not_others(output, output_files(output, names, options.overlays));
+    const double rate = options.rate > 0 ? options.rate : frame_rate(*frames.references);
+    sink = open_sink(output, rate, journal.get(), codecs, options.part_frames);
+    there = sink->begin(names);
+}
+
 Registration register_frames(const Frames& frames, const Rig& rig,
                              const std::filesystem::path& output,
                              const RegistrationOptions& options, const std::string& command,
                              const MadeWith& inputs,
                              const std::vector<std::filesystem::path>& other_reads, Codecs& codecs,
                              const std::function<void(const Registration&)>& progress) {
-    check_output_writable(output);
-    const std::vector<FrameName> names = frame_names(frames);
-    check_over_inputs(frames, other_reads, output, names, options.overlays);
-    check_alone(output);
-    const ImageView reference = (*frames.references)[0].view, source = (*frames.sources)[0].view;
-    const Rig sized = fitted(rig, reference.width, reference.height, source.width, source.height);
-    Journal journal(journal_of(output), made_with(rig, output, options, command, inputs, codecs),
-                    options.overwrite);
-    if (journal.is_new() && !options.overwrite)
-        check_not_others(output, output_files(output, names, options.overlays));
-    const std::unique_ptr<Sink> sink =
-        open_sink(output, frame_rate(*frames.references), &journal, codecs, options.part_frames);
-    const std::map<std::string, long> there = sink->begin(names);
+    const BegunRegistration begun(frames, rig, output, options, command, inputs, other_reads,
+                                  codecs);
+    const std::vector<FrameName>& names = begun.names;
+    const Rig& sized = begun.sized;
+    Sink& sink = *begun.sink;
 
     Registration total;
     total.frames = frames.size();
     total.pixels = static_cast<long>(sized.reference.width) * sized.reference.height * total.frames;
     std::vector<bool> missing;
     for (const FrameName& frame : names) {
-        const auto found = there.find(frame.key);
-        missing.push_back(found == there.end());
+        const auto found = begun.there.find(frame.key);
+        missing.push_back(found == begun.there.end());
         if (missing.back()) continue;
         ++total.earlier;
         total.valid += found->second;
@@ -242,10 +266,10 @@ Registration register_frames(const Frames& frames, const Rig& rig,
                                             p.frame.depth, options.overlays);
                   p.frame = {};
               }),
-        stage("encode", sink->concurrent(), [&](Passing& p, int i) {
+        stage("encode", sink.concurrent(), [&](Passing& p, int i) {
             const Registered result = std::move(p.result);
             if (!missing[i]) return;
-            sink->write(i, names[i], result);
+            sink.write(i, names[i], result);
             ++made;
             valid += valid_pixels(result.mask.view);
         })};
@@ -272,11 +296,11 @@ Registration register_frames(const Frames& frames, const Rig& rig,
                        check_interrupts();
                    });
     } catch (const Interrupted&) {
-        sink->keep();
+        sink.keep();
         check(format("%d of %d frames are done", total.earlier + made.load(), total.frames));
         throw;
     }
-    sink->finish(names, [&] { check("all frames are done, but not yet in one video"); });
+    sink.finish(names, [&] { check("all frames are done, but not yet in one video"); });
     look(total.busy);
     return total;
 }

@@ -15,6 +15,7 @@ from .errors import WRONG_INPUT, ErrorsInOneLine, open_standard_streams, stop
 from .options import ARGUMENTS
 
 COMMANDS = (
+    "batch",
     "calibrate",
     "convert",
     "demo",

@@ -43,8 +43,8 @@ config_option = click.option(
     " depth, ...); those given here go before.",
 )
 frames_arguments = options(
-    click.argument("reference", type=Input()),
-    click.argument("source", type=Input()),
+    click.argument("reference", type=Input(urls=True)),
+    click.argument("source", type=Input(urls=True)),
     *DEPTH_OPTIONS,
     *FOOTAGE_OPTIONS,
     config_option,
@@ -126,6 +126,7 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
             threads,
         ),
         MeasuredDepth(**{field.name: a[field.name] for field in fields(MeasuredDepth)}),
+        (a["source_readout"] or 0.0, a["reference_readout"] or 0.0),
     )
 
 
@@ -195,7 +196,9 @@ def say_depth(frames: Frames) -> None:
         click.echo(frames.depth_line)
 
 
-def print_plan(frames: Frames, outputs: Sequence[Path | None], chosen: Sequence[int] = ()) -> None:
+def print_plan(
+    frames: Frames, outputs: Sequence[Path | str | None], chosen: Sequence[int] = ()
+) -> None:
     """What a run would read, pair, choose and write."""
     click.echo(plan_text(frames.references, frames.sources, frames.depth, list(chosen)))
     say_depth(frames)
