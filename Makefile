@@ -34,7 +34,7 @@ CPP_FILES = $(shell find bench/cpp cpp examples tests -name '*.[ch]' -o -name '*
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
     $(shell find cmake cpp python -type f -not -path '*/__pycache__/*')
 
-.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 test-cluster test-native test-bad-inputs sanitize fuzz kill-test packages \
+.PHONY: help demo cli wheel test-wheel test lint test-cpp test-sdist test-python test-aarch64 test-cluster test-native test-bad-inputs sanitize fuzz kill-test packages \
     format stub clean
 help:
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
@@ -161,6 +161,20 @@ build/sdist/.tested: $(WHEEL_FILES) $(VENV)/.test-requires | $(VENV)/.installed
 	cd build/sdist/site && ../../../$(BIN)/python -c \
 	    'import pathlib, xcalib; assert pathlib.Path(xcalib.__file__).is_relative_to(pathlib.Path.cwd())'
 	touch $@
+
+$(VENV)/.wheel-requires: pyproject.toml $(VENV)/.build-requires
+	@echo "installing what a wheel for others requires"
+	@$(PIP) install -q -r <($(call requirements,project optional-dependencies wheel))
+	touch $@
+wheel: $(VENV)/.wheel-requires | build-packages ## a wheel without Debian's libraries, and the sdist, into build/dist
+	@scripts/install_packages.sh dpkg-dev
+	scripts/wheel_libraries.sh build/wheel-libraries
+	scripts/build_wheel.sh $(BIN)/python build/wheel-libraries build/dist
+	$(BIN)/python -m build --sdist --no-isolation --outdir build/dist .
+SUITE ?= bookworm
+test-wheel: wheel ## as root: the demo by that wheel in a bare Debian with Python and nothing else (SUITE=bookworm)
+	@scripts/install_packages.sh debootstrap
+	scripts/try_wheel.sh $(SUITE) build/dist $(BIN)/python
 
 cli: | test-packages ## the command without Python, into build/release/cpp/cli
 	cmake --preset release -DXCALIB_WERROR=$(WERROR)

@@ -41,7 +41,7 @@ class Run:
 
     def __init__(self, cluster: Cluster, drive: Path, out: Path, *more: str) -> None:
         self.out = out
-        given = arguments(drive, out, "--scheduler", cluster.address, *more)
+        given = arguments(drive, out, "--scheduler", cluster.address, "--quiet", *more)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "xcalib", *given],
             stdout=subprocess.PIPE,
@@ -69,7 +69,10 @@ class Run:
 def frames_noted(out: Path) -> list[str]:
     """Names of the images that the journal notes, as often as it does."""
     found = re.findall(r'"(\d+)\.png":', (out / "register.jsonl").read_text())
-    assert not (out / ".attempts").exists()
+    deadline = time.monotonic() + 30
+    while (out / ".attempts").exists():  # until the last worker has noticed
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
     return sorted(found)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +131,23 @@ class Network:
         if which in names:
             return self.outputs[names.index(str(which))]
         raise InputError(f"{self.path}: no output {which!r}, expected one of {', '.join(names)}")
+
+
+def open_network(
+    path: str | Path, providers: str | Sequence[str] = "cpu", num_threads: int = 0
+) -> Network:
+    """A `Network` that a process opens once, however many drives use it."""
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file")
+    about = Path(path).stat()
+    names = providers if isinstance(providers, str) else ",".join(providers)
+    mark = about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns
+    return _opened(str(path), mark, names, num_threads)
+
+
+@lru_cache(maxsize=2)
+def _opened(path: str, mark: tuple[int, ...], providers: str, num_threads: int) -> Network:
+    return Network(path, providers, num_threads)
 
 
 @dataclass(frozen=True)

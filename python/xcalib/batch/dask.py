@@ -26,13 +26,18 @@ COUNT_EVERY = 1.0
 class DaskWorkers(Workers):
     """The workers of a scheduler, ``tcp://host:port``.
 
+    Parameters
+    ----------
+    quiet
+        Whether to keep the package from logging what connections it has lost.
+
     Raises
     ------
     InputError
         It does not answer, has no worker, or has workers that are not ours.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, quiet: bool = False) -> None:
         try:
             self._distributed = importlib.import_module("distributed")
         except ImportError:
@@ -40,8 +45,8 @@ class DaskWorkers(Workers):
                 f"--scheduler {address}: the package distributed is missing, expected"
                 " `pip install xcalib-rgbt[dask]`"
             ) from None
-        # What it has to say of lost connections would come between our lines.
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        if quiet:
+            hush()
         self._address = address
         self._done: queue.SimpleQueue[Done] = queue.SimpleQueue()
         self._futures: dict[int, Any] = {}
@@ -180,6 +185,13 @@ class DaskWorkers(Workers):
             self._client.cancel(list(self._futures.values()), force=True)
         with contextlib.suppress(Exception):
             self._client.close(timeout=2)
+
+
+def hush() -> None:
+    """Keep the package from printing lines of its own between ours."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _version() -> str:

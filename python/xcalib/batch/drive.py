@@ -206,7 +206,7 @@ class Drive:
             self._ranges = ranges_of(self._missing, size)
         self._job = RegisterJob(
             fingerprint("\n".join((str(ledger.made_with), *(k for k, _ in self._names)))),
-            resolved(inputs, self._frames),
+            resolved(inputs, self._frames, self._options.threads),
             rig,
             dataclasses.replace(self._options, overwrite=False),
             frame_rate(self._frames.references),
@@ -332,9 +332,9 @@ def ranges_of(indices: Sequence[int], most: int) -> list[tuple[int, int]]:
     return ranges
 
 
-def resolved(inputs: Inputs, frames: Frames) -> Inputs:
-    """The inputs for a worker, which may stand in another folder: paths from the root, and an
-    offset of clocks that was estimated here as it was found.
+def resolved(inputs: Inputs, frames: Frames, threads: int) -> Inputs:
+    """The inputs for a worker, which may stand in another folder: paths from the root, an offset of
+    clocks that was estimated here as it was found, and networks on the threads of a shard.
     """
     matching = inputs.matching
     if frames.offset is not None and frames.offset.automatic:
@@ -351,6 +351,7 @@ def resolved(inputs: Inputs, frames: Frames) -> Inputs:
         source=rooted(inputs.source),
         depth=rooted(inputs.depth),
         matching=_rooted_fields(matching),
+        network=dataclasses.replace(inputs.network, num_threads=threads),
         measured=_rooted_fields(inputs.measured),
     )
 

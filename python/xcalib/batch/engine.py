@@ -103,7 +103,8 @@ class _Run:
     def _next(self) -> _Tried | None:
         if self._again:
             return self._again.popleft()
-        if any(map(self._is_suspect, self._under_way.values())):
+        alone = self._workers.is_shared_fate
+        if alone and any(map(self._is_suspect, self._under_way.values())):
             return None
         try:
             shard = next(self._shards)

@@ -44,6 +44,11 @@ class LocalTarget:
             return self.output.with_name(f".{self.output.name}{ATTEMPTS}")
         return self.output / ATTEMPTS
 
+    @property
+    def _sign(self) -> Path:
+        """Is there as long as a run waits for its shards."""
+        return self.attempts / "run"
+
     @contextlib.contextmanager
     def attempt(self) -> Iterator[Path]:
         """A new folder, gone afterwards. Two that do the same shard do not meet."""
@@ -52,9 +57,14 @@ class LocalTarget:
             yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)
+            if not self._sign.exists():
+                with contextlib.suppress(OSError):
+                    self.attempts.rmdir()  # which this one has made again
 
     def publish(self, attempt: Path, names: Mapping[str, str]) -> None:
         """Give files of an attempt their names in the output: each whole, in place of the same."""
+        if not self._sign.exists():
+            raise FileNotFoundError(f"{self.output}: the run that asked for this has ended")
         folders = {(self.folder / name).parent for name in names.values()}
         for folder in folders:
             folder.mkdir(parents=True, exist_ok=True)
@@ -67,9 +77,11 @@ class LocalTarget:
         """Make room for attempts; what a killed run left of its own goes."""
         self.end()
         self.attempts.mkdir(parents=True)
+        self._sign.touch()
 
     def end(self) -> None:
         """No attempt can publish any more."""
+        self._sign.unlink(missing_ok=True)
         shutil.rmtree(self.attempts, ignore_errors=True)
 
 

@@ -184,7 +184,7 @@ def open_workers(scheduler: str | None = None, count: int = 0) -> Iterator[Worke
     if scheduler:
         from .dask import DaskWorkers  # an extra
 
-        workers = DaskWorkers(scheduler)
+        workers = DaskWorkers(scheduler, quiet=True)
     else:
         workers = LocalProcesses(count) if count > 1 else InThisProcess()
     try:
