@@ -27,7 +27,7 @@ from ..registration import PART_FRAMES, RegistrationOptions, described, is_word,
 from ..remote import is_url
 from .engine import Lost, run_shards
 from .manifest import JournalManifest, Manifest, ObjectManifest, begun
-from .register_shard import RegisterJob, RegisterShard
+from .register_shard import RegisterJob, RegisterShard, open_straight
 from .shard import Outcome, Shard
 from .target import LocalTarget, target_of
 from .terminated import terminated_is_interrupted
@@ -172,7 +172,7 @@ class Drive:
         self._options = dataclasses.replace(options, threads=threads_of(workers, options.threads))
         self._start = time.perf_counter()
         self._rig = rig
-        self._frames = frames or Frames.open(inputs, rig)
+        self._frames = frames or open_straight(inputs, rig, options.nearest)
         self._made_of = described(made_of_inputs(inputs) if made_of is None else made_of)
         self._other_reads = list(other_reads)
         self._target = target_of(output)
