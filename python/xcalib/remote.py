@@ -30,8 +30,8 @@ AT_ONCE = {".csv", ".txt", ".yaml", ".yml", ".json"}
 
 
 def is_url(spec: str | Path) -> bool:
-    """Whether it names something behind a URL; ``file://`` too, but no camera's address."""
-    return re.match(r"(?!rtsps?:|rtmp:|rtp:|udp:)[a-z][a-z0-9+.-]+://", str(spec)) is not None
+    """Whether it names something behind a URL; ``file://`` too."""
+    return re.match(r"[a-z][a-z0-9+.-]+://", str(spec)) is not None
 
 
 def file_system(url: str) -> tuple[Any, str]:
