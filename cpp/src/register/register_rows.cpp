@@ -1,7 +1,9 @@
 #include "register/register_rows.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <type_traits>
 
 #define HWY_WANT_AVX3_DL  // which Highway leaves out unless asked
 #include "base/kernel_targets.hpp"
@@ -17,6 +19,28 @@ HWY_BEFORE_NAMESPACE();
 namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
+
+// Where a pixel is made of what is no number, it has no value: as outside of the source.
+void drop_not_finite(float* row, int width, int channels, std::uint8_t* mask) {
+    const auto is_finite = [](float value) { return std::isfinite(value); };
+    for (int x = 0; x < width; ++x) {
+        float* pixel = row + x * channels;
+        if (std::all_of(pixel, pixel + channels, is_finite)) continue;
+        std::fill_n(pixel, channels, 0.0f);
+        if (mask[x] == static_cast<std::uint8_t>(Validity::valid))
+            mask[x] = static_cast<std::uint8_t>(Validity::outside);
+    }
+}
+
+HWY_INLINE bool all_finite(const float* values, int count) {
+    const FloatTag d;
+    Float not_zero = hn::Zero(d);  // what is not finite less itself is no number
+    for (int i = 0; i < count; i += kLanes) {
+        const Float some = load(values + i, count - i);
+        not_zero = hn::Or(not_zero, hn::Sub(some, some));
+    }
+    return hn::AllTrue(d, hn::Eq(not_zero, hn::Zero(d)));
+}
 
 // Where the pixels of a row lie that is looked at a vector at a time.
 struct SlowRow {
@@ -125,6 +149,8 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
 #endif
         if (whole == 0 && task.row_grid) hidden.find();
         for (int x = whole; x < width; x += kLanes) sample_at(x);
+        if constexpr (std::is_same_v<T, float>)  // while the row is near
+            if (!all_finite(out, width * kChannels)) drop_not_finite(out, width, kChannels, mask);
     }
 }
 
