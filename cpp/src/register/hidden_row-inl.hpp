@@ -267,7 +267,8 @@ class HiddenRow {
 
     // What is nearest in these cells, which are `at` too, and the ones behind them, as the upper
     // half of a float.
-    HWY_INLINE Int nearest_at(const Nearness* cells, Int cell, const std::int32_t* at) const {
+    HWY_INLINE Int nearest_at(const Nearness* cells, [[maybe_unused]] Int cell,
+                              const std::int32_t* at) const {
         const IntTag di;
 #if HWY_TARGET != HWY_SCALAR
         const int first = at[kLanes / 2] - kLanes;

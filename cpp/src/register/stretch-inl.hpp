@@ -1,6 +1,7 @@
-// A stretch of a row: what is usual is done in loops of a few steps each, through memory. A
-// vector's steps wait for each other, and what waits fills the processor; in short loops, other
-// vectors' steps come in between. Included once for each instruction set.
+// A stretch of a row: what is usual is done in loops of a few steps each,
+// through memory. A vector's steps wait for each other, and what waits fills
+// the processor; in short loops, other vectors' steps come in between. Included
+// once for each instruction set.
 #if defined(XCALIB_STRETCH_INL_) == defined(HWY_TARGET_TOGGLE)
 #ifdef XCALIB_STRETCH_INL_
 #undef XCALIB_STRETCH_INL_
@@ -18,22 +19,24 @@ namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
 
-// The windows of the vectors. First the place of each vector's first point, as a float shifted by
-// kLarge; then its window's first pixel, shifted by kLargeBits, and where this lies in memory.
+// The windows of the vectors. First the place of each vector's first point, as
+// a float shifted by kLarge; then its window's first pixel, shifted by
+// kLargeBits, and where this lies in memory.
 struct Windows {
     HWY_ALIGN float first_x[kVectors] = {}, first_y[kVectors] = {};
     HWY_ALIGN std::int32_t x[kVectors], y[kVectors], offset[kVectors];
 
-    // Places are in 1 / 2^kShift px. Windows begin `before` pixels left of the point, at the least
-    // in column 0 and row 0, at the most in `last_x` and `last_y`: within memory, whatever the
-    // points are. There are so many units to a column, and to a row.
+    // Places are in 1 / 2^kShift px. Windows begin `before` pixels left of the
+    // point, at the least in column 0 and row 0, at the most in `last_x` and
+    // `last_y`: within memory, whatever the points are. There are so many units
+    // to a column, and to a row.
     template <int kShift>
     HWY_INLINE void place(int before, int last_x, int last_y, int column, int row) {
         const IntTag d;
         const auto within = [](Int value, int last) HWY_ATTR {
             return hn::Min(hn::Max(value, hn::Zero(IntTag())), set(last));
         };
-        const auto whole = [](const float* first) HWY_ATTR {
+        const auto whole = [](const float *first) HWY_ATTR {
             return hn::ShiftRight<kShift>(to_integer(hn::Load(FloatTag(), first)));
         };
         for (int i = 0; i < kVectors; i += kLanes) {
@@ -45,7 +48,7 @@ struct Windows {
             hn::Store(hn::Add(hn::Mul(top, set(row)), hn::Mul(left, set(column))), d, offset + i);
         }
     }
-    HWY_INLINE void start(const RowPoints& points, int count) {
+    HWY_INLINE void start(const RowPoints &points, int count) {
         for (int i = 0; i < count; ++i) {
             first_x[i] = points.u[i * kLanes];
             first_y[i] = points.v[i * kLanes];
@@ -53,8 +56,8 @@ struct Windows {
     }
 };
 
-// Where a point lies along an axis: a whole number, as a float shifted by kLarge, of which the bits
-// are one too, and the rest.
+// Where a point lies along an axis: a whole number, as a float shifted by
+// kLarge, of which the bits are one too, and the rest.
 struct Whole {
     Float shifted;
 
@@ -73,12 +76,13 @@ struct CellStretch {
 
 HWY_INLINE bool none(Int bits) { return hn::AllTrue(IntTag(), hn::Eq(bits, hn::Zero(IntTag()))); }
 
-// Where `count` vectors lie, from pixel `begin` on, and of these points the greatest 1/z. Those no
-// farther than `least` lie nowhere, if no lens bends. `out` is where they will be written, and is
-// asked for, as the next row's depth is, unless it is `later`.
+// Where `count` vectors lie, from pixel `begin` on, and of these points the
+// greatest 1/z. Those no farther than `least` lie nowhere, if no lens bends.
+// `out` is where they will be written, and is asked for, as the next row's
+// depth is, unless it is `later`.
 template <bool bends, bool later>
-HWY_INLINE Float locate(const AnyRow& row, const DepthRow& depths, float least, int begin,
-                        int count, const char* out, int vector_bytes, const RowPoints& points) {
+HWY_INLINE Float locate(const AnyRow &row, const DepthRow &depths, float least, int begin,
+                        int count, const char *out, int vector_bytes, const RowPoints &points) {
     const FloatTag d;
     const Float nowhere = set(std::numeric_limits<double>::quiet_NaN());
     Float along = hn::Add(hn::Iota(d, 0.0f), set(double(begin)));
@@ -88,7 +92,8 @@ HWY_INLINE Float locate(const AnyRow& row, const DepthRow& depths, float least, 
         const Float depth = depths.load(x);
         if constexpr (!later) {
             depths.prefetch_next_row(x);
-            __builtin_prefetch(out + (i + kVectors) * vector_bytes, 1);  // a stretch ahead
+            __builtin_prefetch(out + (i + kVectors) * vector_bytes,
+                               1);  // a stretch ahead
         }
         Points p;
         Mask somewhere;
@@ -108,15 +113,15 @@ HWY_INLINE Float locate(const AnyRow& row, const DepthRow& depths, float least, 
     return nearest;
 }
 
-// By how many rows from `row`, where a vector's first point lies, a window of some rows begins: one
-// up if some point lies above, and in `last` at the most.
+// By how many rows from `row`, where a vector's first point lies, a window of
+// some rows begins: one up if some point lies above, and in `last` at the most.
 HWY_INLINE int first_row(int row, bool above, int last) {
     return std::clamp(above ? row - 1 : row, 0, last) - row;
 }
 
 // Marks those of a vector that are hidden, all of which were valid.
 template <class T, int kChannels>
-HWY_INLINE void mark_vector(Mask hidden, bool hide, T* out, std::uint8_t* mask) {
+HWY_INLINE void mark_vector(Mask hidden, bool hide, T *out, std::uint8_t *mask) {
     if (hn::AllFalse(FloatTag(), hidden)) return;
     store_codes(hn::IfThenElseZero(hn::RebindMask(IntTag(), hidden), code_of(Validity::occluded)),
                 mask);
@@ -125,18 +130,18 @@ HWY_INLINE void mark_vector(Mask hidden, bool hide, T* out, std::uint8_t* mask) 
         if (mask[k]) std::fill_n(out + kChannels * k, kChannels, T{0});
 }
 
-// Marks what is hidden of vectors of which all points lie within the source. Points are in `units`
-// of a pixel.
+// Marks what is hidden of vectors of which all points lie within the source.
+// Points are in `units` of a pixel.
 template <class T, int kChannels>
-HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count,
-                            const RowPoints& points, double units, CellStretch& stretch, T* out,
-                            std::uint8_t* mask) {
+HWY_INLINE void mark_hidden(const RowsTask &task, Vectors vectors, int count,
+                            const RowPoints &points, double units, CellStretch &stretch, T *out,
+                            std::uint8_t *mask) {
     const FloatTag d;
     const IntTag di;
-    const CellGrid& grid = *task.grid;
+    const CellGrid &grid = *task.grid;
     const bool bends = task.projector->bends();
     constexpr int kWindow = 2 * kLanes, kBefore = kWindow / 8;
-    const auto pixels = [&](const float* places) HWY_ATTR {
+    const auto pixels = [&](const float *places) HWY_ATTR {
         return hn::Mul(hn::Sub(hn::Load(d, places), set(kHalfBack)), set(1 / units));
     };
     for (int i = 0; i < count * kLanes; i += kLanes) {
@@ -148,14 +153,14 @@ HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count,
         hn::Store(hn::Sub(cells.y, set(kLarge)), d, stretch.y + i);
     }
     stretch.windows.start({stretch.x, stretch.y, nullptr}, count);
-    Windows& windows = stretch.windows;
+    Windows &windows = stretch.windows;
     windows.place<0>(kBefore, std::max(0, grid.width - kBefore), grid.height - 1, 1, grid.width);
     for (int i = 0; i < count; ++i) {
         const Float at_x = Whole(hn::Load(d, stretch.x + i * kLanes)).shifted;
         const Float at_y = Whole(hn::Load(d, stretch.y + i * kLanes)).shifted;
         const Int index = hn::Sub(hn::BitCast(di, at_x), set(windows.x[i]));
         const Int below = hn::Sub(hn::BitCast(di, at_y), set(windows.y[i]));
-        const Nearness* from = task.cells + windows.offset[i];
+        const Nearness *from = task.cells + windows.offset[i];
         Float nearest_there = hn::BitCast(d, nearest_in_window(from, grid.step(), index));
         if (!none(hn::Or(below, hn::AndNot(set(kWindow - 1), index)))) {
             if (!((vectors >> i) & 1)) continue;
@@ -178,12 +183,13 @@ HWY_INLINE void mark_hidden(const RowsTask& task, Vectors vectors, int count,
     }
 }
 
-// Samples the vectors of which all points lie between the same two rows of the source, and within a
-// window of them. Returns which do not; of these nothing that is written counts, so that nothing
-// waits for a branch. The source must be wider than the window.
+// Samples the vectors of which all points lie between the same two rows of the
+// source, and within a window of them. Returns which do not; of these nothing
+// that is written counts, so that nothing waits for a branch. The source must
+// be wider than the window.
 template <class T, Reach reach>
-HWY_INLINE Vectors sample_windows(const Source& source, int count, const RowPoints& points,
-                                  Windows& windows, T* out) {
+HWY_INLINE Vectors sample_windows(const Source &source, int count, const RowPoints &points,
+                                  Windows &windows, T *out) {
     const FloatTag d;
     constexpr int kWindow = window<T, reach>();
     windows.place<0>(kBefore<T, reach>, source.width - 1 - kWindow, source.height - 2, sizeof(T),
@@ -194,7 +200,7 @@ HWY_INLINE Vectors sample_windows(const Source& source, int count, const RowPoin
         const Whole x(u), y(v);
         const Int index = hn::Sub(x.bits(), set(windows.x[i]));
         const Int apart =
-            hn::Or(hn::Xor(y.bits(), set(windows.y[i])), hn::AndNot(set(kWindow - 1), index));
+            hn::Or(hn::Xor(y.bits(), set(windows.y[i])), beyond_window<T, reach>(index));
         others |= Vectors{!none(apart)} << i;
         store(
             interpolate_in_window<T, reach>(source, windows.offset[i], index, x.rest(u), y.rest(v)),
@@ -203,15 +209,14 @@ HWY_INLINE Vectors sample_windows(const Source& source, int count, const RowPoin
     return others;
 }
 
-// The same of some of the vectors, in three rows of the source: where a lens bends rows, their
-// points often come into the next one.
+// The same of some of the vectors, in three rows of the source: where a lens
+// bends rows, their points often come into the next one.
 template <class T, Reach reach>
-HWY_INLINE Vectors sample_windows_bent(const Source& source, Vectors vectors,
-                                       const RowPoints& points, const Windows& windows, T* out) {
+HWY_INLINE Vectors sample_windows_bent(const Source &source, Vectors vectors,
+                                       const RowPoints &points, const Windows &windows, T *out) {
     if (source.height < 3) return vectors;
     const FloatTag d;
     const IntTag di;
-    constexpr int kWindow = window<T, reach>();
     Vectors others = 0;
     for (; vectors; vectors &= vectors - 1) {
         const int i = first_of(vectors);
@@ -221,7 +226,7 @@ HWY_INLINE Vectors sample_windows_bent(const Source& source, Vectors vectors,
         const int moved = first_row(windows.y[i] - kLargeBits,
                                     !hn::AllFalse(di, hn::Lt(y, hn::Zero(di))), source.height - 3);
         const Int index = hn::Sub(at_x.bits(), set(windows.x[i])), row = hn::Sub(y, set(moved));
-        const Int apart = hn::Or(hn::AndNot(set(1), row), hn::AndNot(set(kWindow - 1), index));
+        const Int apart = hn::Or(hn::AndNot(set(1), row), beyond_window<T, reach>(index));
         others |= Vectors{!none(apart)} << i;
         const int offset = windows.offset[i] + moved * static_cast<int>(source.row_bytes);
         store(interpolate_in_three<T, reach>(source, offset, index,
@@ -232,14 +237,16 @@ HWY_INLINE Vectors sample_windows_bent(const Source& source, Vectors vectors,
     return others;
 }
 
-// The same of some of the vectors, wherever within the source their points lie: at depth edges,
-// where the points come into the next row, of a source too fine for windows, and of colours.
+// The same of some of the vectors, wherever within the source their points lie:
+// at depth edges, where the points come into the next row, of a source too fine
+// for windows, and of colours.
 template <class T, int kChannels, bool fixed>
-HWY_INLINE Vectors gather(const Source& source, Vectors vectors, const RowPoints& points, T* out) {
+HWY_INLINE Vectors gather(const Source &source, Vectors vectors, const RowPoints &points, T *out) {
     const FloatTag d;
     const IntTag di;
     const hn::RebindToUnsigned<IntTag> du;
-    const auto within = [&](Int value, int size) HWY_ATTR {  // those below 0 are large
+    const auto within = [&](Int value,
+                            int size) HWY_ATTR {  // those below 0 are large
         const auto last = hn::Set(du, static_cast<std::uint32_t>(size - 2));
         return hn::BitCast(di, hn::Min(hn::BitCast(du, value), last));
     };
@@ -276,25 +283,30 @@ HWY_INLINE Vectors gather(const Source& source, Vectors vectors, const RowPoints
 
 #if XCALIB_FIXED
 // The same of bytes, located in fixed numbers.
-HWY_INLINE Vectors sample_fixed(const Source& source, int count, const RowPoints& points,
-                                Windows& windows, std::uint8_t* out) {
+template <int kChannels>
+HWY_INLINE Vectors sample_fixed(const Source &source, int count, const RowPoints &points,
+                                Windows &windows, std::uint8_t *out) {
     const FloatTag d;
-    windows.place<kFixedBits>(kFixedWindow / 8, source.width - kFixedWindow, source.height - 2, 1,
-                              static_cast<int>(source.row_bytes));
+    // Of colours, a byte more is read than the window's pixels have.
+    constexpr int kWidth = (kFixedWindow + kChannels - 1) / kChannels;
+    windows.place<kFixedBits>(kFixedBefore<kChannels>, source.width - kWidth, source.height - 2,
+                              kChannels, static_cast<int>(source.row_bytes));
     Vectors others = 0;
     for (int i = 0; i < count; ++i) {
         const Whole u(hn::Load(d, points.u + i * kLanes)), v(hn::Load(d, points.v + i * kLanes));
-        const Int x = hn::Sub(u.bits(), set(windows.x[i])),
-                  y = hn::Sub(v.bits(), set(windows.y[i]));
-        const bool inside = interpolate_fixed<1>(source, windows.offset[i], x, y, out + i * kLanes);
+        const Int x = hn::Sub(u.bits(), set(windows.x[i]));
+        const Int y = hn::Sub(v.bits(), set(windows.y[i]));
+        const bool inside = interpolate_fixed<1, kChannels>(source, windows.offset[i], x, y,
+                                                            out + i * kLanes * kChannels);
         others |= Vectors{!inside} << i;
     }
     return others;
 }
 
 // As sample_windows_bent.
-HWY_INLINE Vectors sample_fixed_bent(const Source& source, Vectors vectors, const RowPoints& points,
-                                     const Windows& windows, std::uint8_t* out) {
+template <int kChannels>
+HWY_INLINE Vectors sample_fixed_bent(const Source &source, Vectors vectors, const RowPoints &points,
+                                     const Windows &windows, std::uint8_t *out) {
     if (source.height < 3) return vectors;
     const FloatTag d;
     const IntTag di;
@@ -302,13 +314,13 @@ HWY_INLINE Vectors sample_fixed_bent(const Source& source, Vectors vectors, cons
     for (; vectors; vectors &= vectors - 1) {
         const int i = first_of(vectors);
         const Whole u(hn::Load(d, points.u + i * kLanes)), v(hn::Load(d, points.v + i * kLanes));
-        const Int x = hn::Sub(u.bits(), set(windows.x[i])),
-                  y = hn::Sub(v.bits(), set(windows.y[i]));
+        const Int x = hn::Sub(u.bits(), set(windows.x[i]));
+        const Int y = hn::Sub(v.bits(), set(windows.y[i]));
         const int moved = first_row((windows.y[i] - kLargeBits) >> kFixedBits,
                                     !hn::AllFalse(di, hn::Lt(y, hn::Zero(di))), source.height - 3);
-        const bool inside = interpolate_fixed<2>(
+        const bool inside = interpolate_fixed<2, kChannels>(
             source, windows.offset[i] + moved * static_cast<int>(source.row_bytes), x,
-            hn::Sub(y, set(moved * (1 << kFixedBits))), out + i * kLanes);
+            hn::Sub(y, set(moved * (1 << kFixedBits))), out + i * kLanes * kChannels);
         others |= Vectors{!inside} << i;
     }
     return others;
@@ -316,8 +328,8 @@ HWY_INLINE Vectors sample_fixed_bent(const Source& source, Vectors vectors, cons
 #endif
 
 template <class T, Reach reach>
-HWY_INLINE Vectors sample_in(const Source& source, int count, bool bends, const RowPoints& points,
-                             Windows& windows, T* out) {
+HWY_INLINE Vectors sample_in(const Source &source, int count, bool bends, const RowPoints &points,
+                             Windows &windows, T *out) {
     const Vectors others = sample_windows<T, reach>(source, count, points, windows, out);
     return bends ? sample_windows_bent<T, reach>(source, others, points, windows, out) : others;
 }
@@ -325,18 +337,18 @@ HWY_INLINE Vectors sample_in(const Source& source, int count, bool bends, const 
 // A row of the reference, on its way into the source.
 template <class T, int kChannels>
 struct UsualRow {
-    const RowsTask& task;
-    const Source& source;
-    const DepthRow& depths;
-    T* out;
-    std::uint8_t* mask;
+    const RowsTask &task;
+    const Source &source;
+    const DepthRow &depths;
+    T *out;
+    std::uint8_t *mask;
     Reach reach;
     bool fixed = false;  // are the points in whole numbers of kFixedUnit?
     AnyRow row;
     float least_depth;
 
-    HWY_INLINE UsualRow(const RowsTask& of, const Source& from, const DepthRow& depth, int y, T* to,
-                        std::uint8_t* codes)
+    HWY_INLINE UsualRow(const RowsTask &of, const Source &from, const DepthRow &depth, int y, T *to,
+                        std::uint8_t *codes)
         : task(of), source(from), depths(depth), out(to), mask(codes),
           reach(reach_of<T>(from, of.projector->step_along_row(of.depth->width() / 2, y))),
           fixed(takes_fixed(from, reach)),
@@ -345,24 +357,25 @@ struct UsualRow {
 
     HWY_INLINE double units() const { return fixed ? kFixedUnit : 1.0; }  // of a pixel
 
-    // Vectors, `count` from pixel `begin` on, of whose points the greatest 1/z is returned.
+    // Vectors, `count` from pixel `begin` on, of whose points the greatest 1/z is
+    // returned.
     template <bool later>
-    HWY_INLINE Float locate(int begin, int count, const RowPoints& points) const {
-        const auto* to = reinterpret_cast<const char*>(out + begin * kChannels);
+    HWY_INLINE Float locate(int begin, int count, const RowPoints &points) const {
+        const auto *to = reinterpret_cast<const char *>(out + begin * kChannels);
         constexpr int kBytes = int{sizeof(T)} * kLanes * kChannels;
         return row.bends ? HWY_NAMESPACE::locate<true, later>(row, depths, least_depth, begin,
                                                               count, to, kBytes, points)
                          : HWY_NAMESPACE::locate<false, later>(row, depths, least_depth, begin,
                                                                count, to, kBytes, points);
     }
-    // The same vectors, located, of a mask that is 0. Returns those of which some points lie
-    // outside the source, or nowhere.
-    HWY_INLINE Vectors sample(int begin, int count, const RowPoints& points) const;
+    // The same vectors, located, of a mask that is 0. Returns those of which some
+    // points lie outside the source, or nowhere.
+    HWY_INLINE Vectors sample(int begin, int count, const RowPoints &points) const;
 
    private:
-    static HWY_INLINE bool takes_fixed(const Source& source, Reach reach) {
+    static HWY_INLINE bool takes_fixed(const Source &source, Reach reach) {
 #if XCALIB_FIXED
-        return sizeof(T) == 1 && kChannels == 1 && fits_fixed(source, reach);
+        return sizeof(T) == 1 && fits_fixed<kChannels>(source, reach);
 #else
         (void)source, (void)reach;
         return false;
@@ -372,16 +385,17 @@ struct UsualRow {
 
 template <class T, int kChannels>
 HWY_INLINE Vectors UsualRow<T, kChannels>::sample(int begin, int count,
-                                                  const RowPoints& points) const {
-    T* to = out + begin * kChannels;
+                                                  const RowPoints &points) const {
+    T *to = out + begin * kChannels;
     Windows windows;
     windows.start(points, count);
 #if XCALIB_FIXED
-    if constexpr (sizeof(T) == 1 && kChannels == 1) {
+    if constexpr (sizeof(T) == 1) {
         if (fixed) {
-            Vectors others = sample_fixed(source, count, points, windows, to);
-            if (row.bends) others = sample_fixed_bent(source, others, points, windows, to);
-            return gather<T, 1, true>(source, others, points, to);
+            Vectors others = sample_fixed<kChannels>(source, count, points, windows, to);
+            if (row.bends)
+                others = sample_fixed_bent<kChannels>(source, others, points, windows, to);
+            return gather<T, kChannels, true>(source, others, points, to);
         }
     }
 #endif
@@ -395,12 +409,12 @@ HWY_INLINE Vectors UsualRow<T, kChannels>::sample(int begin, int count,
     return gather<T, kChannels, false>(source, others, points, to);
 }
 
-// The whole vectors of a row, of which one(x) does those that are not usual. `nearest` is the
-// greatest 1/z of the pixels behind them, which have been put.
+// The whole vectors of a row, of which one(x) does those that are not usual.
+// `nearest` is the greatest 1/z of the pixels behind them, which have been put.
 template <class T, int kChannels, class One>
-HWY_INLINE void register_usual(const UsualRow<T, kChannels>& row, int whole, HiddenRow& hidden,
-                               Float nearest, const One& one) {
-    const RowsTask& task = row.task;
+HWY_INLINE void register_usual(const UsualRow<T, kChannels> &row, int whole, HiddenRow &hidden,
+                               Float nearest, const One &one) {
+    const RowsTask &task = row.task;
     constexpr int kStretch = kVectors * kLanes;  // pixels
     const auto vectors_from = [&](int x) { return std::min(kVectors, (whole - x) / kLanes); };
     const auto finish = [&](int x, Vectors others) HWY_ATTR {

@@ -99,14 +99,20 @@ void check_output_writable(const Path& output) {
 void check_apart(const std::vector<Path>& reads, const Writes& writes) {
     std::map<Identity, Path> read;
     std::set<Identity> image_folders;
-    const auto add = [&](const Path& file) {
-        if (const auto identity = identity_of(file)) read.emplace(*identity, file);
-        if (!is_image(file)) return;
-        if (const auto identity = identity_of(folder_of(file))) image_folders.insert(*identity);
+    std::set<Path> seen, seen_folders;        // each is asked for once: there may be many
+    const auto add = [&](const Path& file) {  // is it a folder?
+        if (file.empty() || !seen.insert(file).second) return false;
+        struct stat about {};
+        const bool there = stat(file.c_str(), &about) == 0;
+        if (there) read.emplace(Identity{about.st_dev, about.st_ino}, file);
+        if (const Path folder = folder_of(file);
+            is_image(file) && seen_folders.insert(folder).second)
+            if (const auto identity = identity_of(folder)) image_folders.insert(*identity);
+        return there && S_ISDIR(about.st_mode);
     };
     for (const Path& path : reads) {
+        if (!add(path)) continue;
         std::error_code none;
-        if (!path.empty()) add(path);
         for (const fs::directory_entry& entry : fs::directory_iterator(path, none))
             if (entry.is_regular_file(none)) add(entry.path());
     }
