@@ -34,7 +34,7 @@ CPP_FILES = $(shell find bench/cpp cpp examples tests -name '*.[ch]' -o -name '*
 WHEEL_FILES := CMakeLists.txt pyproject.toml README.md LICENSE third_party/README.md \
     $(shell find cmake cpp python -type f -not -path '*/__pycache__/*')
 
-.PHONY: help demo cli test lint test-cpp test-sdist test-python test-aarch64 test-native test-bad-inputs sanitize fuzz kill-test packages \
+.PHONY: help demo cli wheel test-wheel test lint test-cpp test-sdist test-python test-aarch64 test-cluster test-native test-bad-inputs sanitize fuzz kill-test packages \
     format stub clean
 help:
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/:/' | column -t -s ':'
@@ -115,12 +115,12 @@ sanitize: | test-packages ## C++ tests under the sanitizers: addresses and undef
 fuzz-packages: | test-packages
 	@scripts/install_packages.sh $(FUZZ_PACKAGES)
 FUZZ_SECONDS ?= 60
-FUZZ_TARGETS := depth_stream journal npy rig_file times_table tiff_stack video
+FUZZ_TARGETS := arrays depth_stream flir headers journal npy rig_file times_table tiff_stack video
 # A unit that takes over 10 s or 2 GB has failed too.
 fuzz: $(VENV)/.installed $(VENV)/.test-requires | fuzz-packages ## every reader of files under libFuzzer, a minute each
 	cmake --preset fuzz -DXCALIB_WERROR=$(WERROR)
 	cmake --build --preset fuzz
-	PYTHONPATH=tests/bad_inputs $(BIN)/python tests/fuzz/write_corpora.py build/fuzz/seeds
+	PYTHONPATH=tests:tests/bad_inputs $(BIN)/python tests/fuzz/write_corpora.py build/fuzz/seeds
 	for target in $(FUZZ_TARGETS); do \
 	    mkdir -p build/fuzz/corpus/$$target; \
 	    build/fuzz/tests/fuzz/fuzz_$$target -max_total_time=$(FUZZ_SECONDS) -timeout=10 -rss_limit_mb=2048 \
@@ -130,6 +130,9 @@ fuzz: $(VENV)/.installed $(VENV)/.test-requires | fuzz-packages ## every reader 
 KILLS ?= 100
 kill-test: $(VENV)/.installed $(VENV)/.test-requires cli ## runs killed at random moments, and resumed
 	$(BIN)/python tests/kills.py --kills $(KILLS)
+
+test-cluster: $(VENV)/.installed $(VENV)/.test-requires ## workers and schedulers that are killed, stopped, full, or of another version
+	cd tests && XCALIB_CLUSTER=1 ../$(BIN)/python -m pytest test_cluster.py
 
 test-native: | test-packages ## the registrar for this machine's instruction set alone, as some compile all they have
 	$(call preset,native)
@@ -159,6 +162,20 @@ build/sdist/.tested: $(WHEEL_FILES) $(VENV)/.test-requires | $(VENV)/.installed
 	    'import pathlib, xcalib; assert pathlib.Path(xcalib.__file__).is_relative_to(pathlib.Path.cwd())'
 	touch $@
 
+$(VENV)/.wheel-requires: pyproject.toml $(VENV)/.build-requires
+	@echo "installing what a wheel for others requires"
+	@$(PIP) install -q -r <($(call requirements,project optional-dependencies wheel))
+	touch $@
+wheel: $(VENV)/.wheel-requires | build-packages ## a wheel without Debian's libraries, and the sdist, into build/dist
+	@scripts/install_packages.sh dpkg-dev
+	scripts/wheel_libraries.sh build/wheel-libraries
+	scripts/build_wheel.sh $(BIN)/python build/wheel-libraries build/dist
+	$(BIN)/python -m build --sdist --no-isolation --outdir build/dist .
+SUITE ?= bookworm
+test-wheel: wheel ## as root: the demo by that wheel in a bare Debian with Python and nothing else (SUITE=bookworm)
+	@scripts/install_packages.sh debootstrap
+	scripts/try_wheel.sh $(SUITE) build/dist $(BIN)/python
+
 cli: | test-packages ## the command without Python, into build/release/cpp/cli
 	cmake --preset release -DXCALIB_WERROR=$(WERROR)
 	cmake --build --preset release --target xcalib-cli
@@ -167,7 +184,7 @@ cli: | test-packages ## the command without Python, into build/release/cpp/cli
 test-python: $(VENV)/.installed $(VENV)/.test-requires cli ## Python tests, on the installed package
 	cd tests && ../$(BIN)/python -m pytest -n auto --dist loadfile
 
-test-bad-inputs: $(VENV)/.installed $(VENV)/.test-requires cli ## each bad input on both commands
+test-bad-inputs: $(VENV)/.installed $(VENV)/.test-requires cli ## each bad input on both commands and the Python API
 	cd tests && XCALIB_ALL_ROWS=1 ../$(BIN)/python -m pytest -n auto bad_inputs
 
 # -- Figures --------------------------------------------------------------------------------------

@@ -45,7 +45,8 @@ PUBLISHED = (  # each has its table in docs/performance.md
     scripts("speed", "kernels", "register_frame", "calibration_time")
     | scripts("accuracy", "night_rig", "flir_rig", "depth_measured")
 )
-OTHERS = scripts("speed", "stream") | scripts(
+OTHERS = scripts("speed", "stream") | scripts("scale", "efficiency", "overhead", "simulate")
+OTHERS |= scripts(
     "accuracy",
     *("synthetic_rigs", "depth_sources", "depth_completion", "depth_conditioning", "patch_flow"),
     *("flow_term", "frame_choice", "clock_offset", "lags", "lenses", "rolling_shutter", "trust"),

@@ -42,7 +42,10 @@ def test_registered_frames_mark_them(scene: Path, tmp_path: Path) -> None:
         write_image(path.with_suffix(".tiff"), spoiled(read_image(path)))
         path.unlink()
     given = ("register", scene / "rig.yaml", scene / "visible", scene / "thermal")
-    assert run(*given, "--depth", scene / "depth", "-o", tmp_path / "out").exit_code == 0
+    result = run(*given, "--depth", scene / "depth", "-o", tmp_path / "out")
+    assert result.exit_code == 0
+    count = len(list_files(scene / "thermal")) * (len(DEAD) + 6 * 8)
+    assert f"{count} source pixels are not finite, masked" in result.stdout
     for path in list_files(tmp_path / "out"):
         image, mask = read_image(path), read_image(tmp_path / "out" / "masks" / f"{path.stem}.png")
         assert np.isfinite(image).all()

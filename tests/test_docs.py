@@ -108,6 +108,8 @@ def folder(rendered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("rig.yaml", "my_rig.yaml"):
         shutil.copy(rendered / "rig.yaml", folder / name)
     (folder / "data").symlink_to(rendered)
+    (jobs,) = (text for language, text in blocks(ROOT / "docs" / "scale.md") if language == "yaml")
+    (folder / "jobs.yaml").write_text(jobs)
     files_of_others(folder, [path.name for path in list_files(folder / "visible")])
     visible, thermal = (
         [read_image(path) for path in list_files(folder / name)] for name in ("visible", "thermal")
@@ -143,7 +145,8 @@ def test_printed_commands_run(
     monkeypatch.chdir(tmp_path)
     words = shlex.split(re.sub(r"\s#\s.*", "", line))[1:]
     # They open, pair and choose all that they name; README's own are run to their end.
-    dry = words[0] in ("calibrate", "register", "evaluate") and line not in README_COMMANDS
+    long = ("batch", "calibrate", "register", "evaluate", "view", "transfer")
+    dry = words[0] in long and line not in README_COMMANDS
     result = run(*words, *(["--dry-run"] if dry else []))
     assert result.exit_code in (0, 3), result.stderr
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import resource
+import struct
 from pathlib import Path
 
 import cv2
@@ -170,6 +171,27 @@ def test_alpha_is_dropped(tmp_path: Path) -> None:
     image = noise(5, 7, 4)
     (tmp_path / "a.png").write_bytes(encoded(".png", image))
     np.testing.assert_array_equal(read_image(tmp_path / "a.png"), image[..., :3])
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("said", [1, 2, None], ids=["unsigned", "signed", "unsaid"])
+def test_32_bit_counts_become_floats(tmp_path: Path, order: str, said: int | None) -> None:
+    counts = np.array([[0, 7, 70000], [1 << 24, 3 << 30, 5]], np.uint32)
+    if said == 2:
+        counts = counts.astype(np.int32)
+    path = tmp_path / "a.tiff"
+    values = {256: 3, 257: 2, 258: 32, 259: 1, 262: 1, 273: 200, 277: 1, 278: 2, 279: 24}
+    if said is not None:
+        values[339] = said
+    fields = [
+        struct.pack(f"{order}HHIHH", tag, 3, 1, value, 0) for tag, value in sorted(values.items())
+    ]
+    head = (b"II" if order == "<" else b"MM") + struct.pack(f"{order}HIH", 42, 8, len(fields))
+    data = (head + b"".join(fields) + bytes(4)).ljust(200, b"\0")
+    path.write_bytes(data + counts.astype(f"{order}i4").tobytes())
+    image = read_image(path)
+    assert image.dtype == np.float32
+    np.testing.assert_array_equal(image, counts.astype(np.float32))
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".tiff", ".bmp"])

@@ -257,6 +257,28 @@ def test_custom_operators_are_refused(tmp_path: Path) -> None:
         Network(model)
 
 
+@pytest.mark.parametrize(
+    ("ir", "opset", "problem"),
+    [
+        (99, 17, "is of ONNX's IR version 99, this ONNX Runtime reads up to"),
+        (9, 99, "is of opset 99, this ONNX Runtime knows up to"),
+    ],
+)
+def test_models_of_the_future(tmp_path: Path, ir: int, opset: int, problem: str) -> None:
+    model = onnx.load(channel(tmp_path / "m.onnx"))
+    model.ir_version, model.opset_import[0].version = ir, opset
+    onnx.save(model, tmp_path / "m.onnx")
+    with pytest.raises(InputError, match=rf"m\.onnx: {problem} .* newer onnxruntime") as caught:
+        Network(tmp_path / "m.onnx")
+    assert "onnxruntime/core" not in str(caught.value)
+
+
+def test_graphs_that_are_not_valid(tmp_path: Path) -> None:
+    nodes = [helper.make_node("Add", ["image", "nowhere"], ["depth"])]
+    with pytest.raises(InputError, match=r"m\.onnx: its graph is not valid .*'nowhere'"):
+        Network(save_graph(tmp_path / "m.onnx", nodes))
+
+
 def test_missing_weights_are_named(tmp_path: Path) -> None:
     model = weighted(tmp_path / "m.onnx", 1.0)
     (tmp_path / "m.weights").unlink()
@@ -277,7 +299,10 @@ def test_sizes_a_graph_was_not_made_for(tmp_path: Path, monkeypatch: pytest.Monk
     weights = {"w": np.ones((3, 20, 20), np.float32)}
     model = save_graph(tmp_path / "m.onnx", nodes, constants=weights)
     provider = depth_of(model, PLAIN, monkeypatch)
-    with pytest.raises(InputError, match=r"m\.onnx: cannot run on image \(1, 3, 24, 32\)"):
+    with pytest.raises(
+        InputError,
+        match=r"m\.onnx: cannot run on image \(1, 3, 24, 32\): its step Add '' fails .*`multiple`",
+    ):
         provider(0, REFERENCE)
 
 

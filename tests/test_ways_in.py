@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from conftest import run
+from flir import radiometric
 from xcalib import CalibrationOptions, Pinhole, Rig, calibrate
 from xcalib._core import (
     DepthUnits,
@@ -25,6 +27,7 @@ from xcalib._core import (
     read_times,
     times_of_names,
 )
+from xcalib.convert import is_foreign, read_rig
 from xcalib.depth import open_depth, read_depth
 from xcalib.footage import Matching, open_pairs, open_stream
 from xcalib.frames import DecodeError, InputError, list_files, read_image
@@ -275,52 +278,11 @@ def test_two_images_in_one_frame_are_told() -> None:
     metres = [np.full((120, 160), 5, np.float32)] * 3
     result = calibrate(scenes, high, metres, options=options)
     distrust(line, result)
-    assert not result.converged and line in result.report.message
+    assert not result.converged and result.report.message.startswith(line)
+    assert result.report.verdict.line().startswith(f"{line}; besides: ")
 
 
 # -- Radiometric JPEGs -----------------------------------------------------------------------------
-
-PLANCK = {0x58: 16556.0, 0x5C: 1428.0, 0x60: 1.0, 0x30C: 0.0466}
-
-
-def radiometric(thermal: Array, visible: Array | None, raw: str = "png") -> bytes:
-    """A JPEG as FLIR writes them: its records in segments of the file."""
-    # In a PNG counts have the wrong order of bytes.
-    pixels = png(thermal.byteswap()) if raw == "png" else thermal.astype("<u2").tobytes()
-    height, width = thermal.shape
-    head = struct.pack("<HHH", 2, width, height).ljust(32, b"\0")
-    camera = bytearray(0x320)
-    struct.pack_into("<H", camera, 0, 2)
-    for at, value in PLANCK.items():
-        struct.pack_into("<f", camera, at, value)
-    struct.pack_into("<i", camera, 0x308, -342)
-    picture = struct.pack(">fhh", 1.3, 12, -7).ljust(32, b"\0")
-    records = [(1, head + pixels), (0x20, bytes(camera)), (0x2A, picture)]
-    if visible is not None:
-        jpeg = cv2.imencode(".jpg", visible)[1].tobytes()
-        records.append(
-            (0x0E, struct.pack("<HHH", 3, *visible.shape[1::-1]).ljust(32, b"\0") + jpeg)
-        )
-    start = 64 + 32 * len(records)
-    directory, body = b"", b""
-    for kind, data in records:
-        directory += struct.pack(">HHIIII", kind, 1, 100, 1, start + len(body), len(data)).ljust(
-            32, b"\0"
-        )
-        body += data
-    head = b"FFF\0" + b"test".ljust(16, b"\0") + struct.pack(">III", 101, 64, len(records))
-    data = head.ljust(64, b"\0") + directory + body
-    shown = cv2.imencode(".jpg", np.full((48, 64), 7, np.uint8))[1].tobytes()
-    parts = [data[at : at + 60000] for at in range(0, len(data), 60000)]
-    segments = b"".join(
-        b"\xff\xe1"
-        + struct.pack(">H", len(part) + 10)
-        + b"FLIR\0\1"
-        + bytes([i, len(parts) - 1])
-        + part
-        for i, part in enumerate(parts)
-    )
-    return shown[:2] + segments + shown[2:]
 
 
 @pytest.fixture
@@ -354,6 +316,29 @@ def test_a_folder_of_radiometric_jpegs_is_both_cameras(flir: tuple[Path, Array, 
     assert pairs.references[0].shape == (240, 320, 3)
     np.testing.assert_array_equal(pairs.sources[0], thermal)
     assert any("radiometric JPEGs" in note for note in pairs.notes)
+
+
+def test_a_cameras_own_alignment_is_a_start(flir: tuple[Path, Array, Array], binary: Path) -> None:
+    folder, _, _ = flir
+    rig = read_rig(folder / "FLIR1.jpg")
+    assert (rig.reference.width, rig.source.width) == (320, 240)
+    # The thermal middle is off the visible one's, and the width takes 1 / 1.3 of the visible one's.
+    points = np.array([[159.5 + 12, 119.5 - 7], [159.5 + 12 - 100 / 240 * 320 / 1.3, 119.5 - 7]])
+    np.testing.assert_allclose(
+        rig.transfer(points, np.full(2, 50.0)), [[119.5, 89.5], [19.5, 89.5]], atol=0.01
+    )
+    assert is_foreign(folder / "FLIR0.jpg")
+    (folder.parent / "none.jpg").write_bytes(cv2.imencode(".jpg", np.zeros((9, 9), np.uint8))[1])
+    with pytest.raises(InputError, match=r"none\.jpg: no rig file and no radiometric JPEG"):
+        read_rig(folder.parent / "none.jpg")
+    given = [folder, folder, "--depth", "5", "--dry-run", "-o", folder.parent / "new.yaml"]
+    for start, code in ((folder / "FLIR0.jpg", 0), (folder.parent / "none.jpg", 2)):
+        words = [*map(str, given), "--initial", str(start)]
+        command = [binary, "calibrate", *words]
+        cli = subprocess.run(command, capture_output=True, text=True, check=False)
+        python = run("calibrate", *words)
+        assert python.exit_code == cli.returncode == code, (python.stderr, cli.stderr)
+        assert python.stderr == cli.stderr
 
 
 def test_a_truncated_radiometric_jpeg_is_named(flir: tuple[Path, Array, Array]) -> None:
@@ -479,6 +464,26 @@ def test_arguments_in_a_file(folders: tuple[Path, Path], rig: Path) -> None:
     result = run("register", "--config", job)
     assert result.exit_code == 2
     assert "unknown key 'depht', expected rig, reference, source, depth," in result.stderr
+
+
+def test_view_transfer_and_report_take_a_file_and_run_dry(
+    folders: tuple[Path, Path], rig: Path, calibrated: tuple[Path, Any]
+) -> None:
+    job, out, page = (rig.parent / name for name in ("job.yaml", "look.mp4", "page.html"))
+    labels, report = rig.parent / "labels", calibrated[0] / "report.json"
+    labels.mkdir()
+    frames = f"rig: {rig}\nreference: {folders[0]}\nsource: {folders[1]}\ndepth: 7\n"
+    for command, text, first, last in (
+        ("view", f"{frames}output: {out}", "6 pairs:", f"would be written: {out}"),
+        ("transfer", f"{frames}output: new\nlabels: {labels}", "6 pairs:", f"labels: {labels}"),
+        ("report", f"run: {report}\noutput: {page}", "6 pairs:", f"would be written: {page}"),
+        ("report", f"run: {report}", f"would be printed: {report}", ""),
+    ):
+        job.write_text(text)
+        result = run(command, "--config", job, "--dry-run")
+        assert result.exit_code == 0, result.stderr
+        assert result.stdout.startswith(first) and last in result.stdout
+    assert not out.exists() and not page.exists()
 
 
 def test_a_dry_run_says_what_would_be_done(folders: tuple[Path, Path], rig: Path) -> None:

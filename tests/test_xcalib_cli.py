@@ -461,6 +461,12 @@ def test_what_only_python_does_is_named(
     result = cli("calibrate", "visible", "thermal", *arguments, "-o", "r.yaml", cwd=rendered)
     assert result.returncode == 2
     assert named in result.stderr and "the Python command, `xcalib`" in result.stderr
+    many = cli(
+        *("register", "rig.yaml", "visible", "thermal", "--depth", "depth", "-o", "o"),
+        *("--scheduler", "tcp://localhost:1"),
+        cwd=rendered,
+    )
+    assert many.returncode == 2 and "--scheduler: several workers are used by the" in many.stderr
     bag = cli("evaluate", "rig.yaml", "a.mcap#/v", "thermal", "--depth", "plane", cwd=rendered)
     assert bag.returncode == 2 and "Python command" in bag.stderr
 
@@ -487,6 +493,34 @@ def test_wrong_usage(cli: Callable[..., Process], tmp_path: Path, arguments: Any
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_stereo_calibration_is_the_three_numbers(
+    both: Callable[..., tuple[Process, Result]], scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(scene)
+    Path("disparity").mkdir()
+    for path in list_files("depth"):
+        depth = read_depth(path)
+        with np.errstate(divide="ignore"):
+            disparity = np.where(depth > 0, 0.5 * 300 / depth - 0.1, np.nan).astype(np.float32)
+        np.save(Path("disparity") / path.with_suffix(".npy").name, disparity)
+    Path("stereo.yaml").write_text("baseline: 0.5\nfocal: 300\ndoffs: 0.1\n")
+    given = ("evaluate", "rig.yaml", "visible", "thermal", "--width", "80", "--depth")
+    first, second = both(*given, "disparity:disparity", "--stereo-calibration", "stereo.yaml")
+    plain = run(*given, "depth")
+    tables = [r.stdout.split("depth:")[0].splitlines()[1:4] for r in (first, second, plain)]
+    assert tables[0] == tables[1] == tables[2] and len(tables[0]) == 3
+    for text, problem in (
+        ("baseline: 0.5\n", "stereo.yaml: focal is missing"),
+        ("baseline: x\nfocal: 3\n", "stereo.yaml: baseline is 'x', expected a number"),
+        ("baseline: 1\nfocal: 3\nz: 1\n", "unknown key 'z', expected baseline, focal, doffs"),
+        ("baseline: -1\nfocal: 3\n", "stereo baseline is -1, expected above 0 m"),
+    ):
+        Path("stereo.yaml").write_text(text)
+        first, second = both(*given, "disparity:disparity", "--stereo-calibration", "stereo.yaml")
+        assert first.returncode == 2 and problem in first.stderr
+        assert first.stderr == second.stderr
+
+
 def test_help_and_version(cli: Callable[..., Process]) -> None:
     assert cli("--version").stdout == f"xcalib-cli, version {run('--version').stdout.split()[-1]}\n"
     for command in ("calibrate", "register", "evaluate", "inspect", "bench"):
@@ -498,7 +532,7 @@ def test_help_and_version(cli: Callable[..., Process]) -> None:
 # What the Python command alone does, docs/cli.md.
 ONLY_PYTHON = {
     *("--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"),
-    *("--lidar-calibration", "--stereo-calibration"),
+    *("--lidar-calibration", "--workers", "--scheduler"),
 }
 
 

@@ -11,7 +11,7 @@
 namespace xcalib::cli {
 namespace {
 
-struct Arguments {
+struct BenchArguments {
     std::string rig, reference = "640x480", source = "640x512";
     int frames = 10000;
 };
@@ -34,7 +34,7 @@ const char* dtype_of(PixelType type) {
     return "float32";
 }
 
-void run(const Arguments& a, Console& console) {
+void run(const BenchArguments& a, Console& console) {
     const auto [width, height] = size_of("--reference", a.reference);
     const auto [source_width, source_height] = size_of("--source", a.source);
     const Rig rig =
@@ -65,8 +65,8 @@ void run(const Arguments& a, Console& console) {
 void add_bench(CLI::App& app, Console& console) {
     CLI::App* command =
         app.add_subcommand("bench", "Time the registration of frames on this machine.");
-    auto arguments = std::make_shared<Arguments>();
-    Arguments& a = *arguments;
+    auto arguments = std::make_shared<BenchArguments>();
+    BenchArguments& a = *arguments;
     command
         ->add_option("--rig", a.rig,
                      "Rig file whose image sizes and baseline to time.  [default: cameras side by"

@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "depth.hpp"
 #include "files.hpp"
+#include "motion.hpp"
 #include "open_frames.hpp"
 #include "xcalib/calibrate.hpp"
 #include "xcalib/depth/fit_plane.hpp"
@@ -23,7 +24,7 @@
 namespace xcalib::cli {
 namespace {
 
-struct Arguments {
+struct CalibrateArguments {
     FrameArguments frames;
     std::string output, choose = "informed", colormap = "auto", initial, search = "auto",
                         mount = "auto", flow = "auto", solver = "ceres", tolerance = "2,5", report,
@@ -56,7 +57,7 @@ Pinhole intrinsics(const std::string& flag, const std::string& text) {
 }
 
 // The frames that say most about the rig.
-std::vector<int> choose_by_content(const Frames& frames, const Arguments& arguments,
+std::vector<int> choose_by_content(const Frames& frames, const CalibrateArguments& arguments,
                                    Console& console, RunFacts& run) {
     const std::vector<int> drawn =
         frames_to_look_at(frames.size(), arguments.options.max_frames, arguments.options.seed);
@@ -160,7 +161,27 @@ void look_at_lags(Frames& frames, LoadedFrames& loaded, const CalibrationOptions
     }
 }
 
-void check(const Arguments& a) {
+// The readout that is `auto`, as frames of which `loaded` are some show it; `raw` are as they were
+// read.
+void find_readout(const CalibrateArguments& a, const Frames& raw, const LoadedFrames& loaded,
+                  const Rig& rig, Console& console, Readout& readout, RunFacts& run) {
+    const bool of_reference = a.frames.reference_readout == "auto";
+    FittedFrames fitted{loaded.views(&Frame::reference), {}, loaded.views(&Frame::depth), {}};
+    for (const int index : loaded.indices)
+        fitted.partners.push_back(raw.partners[static_cast<std::size_t>(index)]);
+    const ReadoutFit fit =
+        fit_readout(fitted, raw.all_sources, rig, a.options, readout, of_reference, motion_between,
+                    [&](double share) { console.progress("readout", share); });
+    const std::string camera = of_reference ? "reference" : "source";
+    console.line("rolling shutter: " + fit.line(camera));
+    console.event("readout", {{"camera", camera}, {"share", fit.share}, {"seen", fit.seen}});
+    if (!fit.seen) return;
+    (of_reference ? readout.reference : readout.source) = fit.taken();
+    run.arguments.insert(run.arguments.end(),
+                         {"--" + camera + "-readout", std::to_string(fit.taken()).substr(0, 4)});
+}
+
+void check(const CalibrateArguments& a) {
     if (Path(a.report).extension() == ".html")
         throw InputError("--report " + a.report +
                          ": pages are written by the Python command, `xcalib`; expected a file of "
@@ -186,7 +207,7 @@ void check(const Arguments& a) {
     value_of("--flow", a.flow, flow_arguments());
 }
 
-void run(Arguments a, bool has_report, Console& console) {
+void run(CalibrateArguments a, bool has_report, Console& console) {
     check(a);
     CalibrationOptions& options = a.options;
     options.search.mode = value_of<SearchMode>("--search", a.search);
@@ -205,11 +226,13 @@ void run(Arguments a, bool has_report, Console& console) {
 
     std::optional<Rig> initial;
     if (!a.initial.empty()) initial = load_rig(a.initial, console);
+    Readout readout = readout_of(a.frames, true);
     Frames frames = open_frames(a.frames, initial, console);
     std::vector<Path> writes = {a.output};
     if (has_report) writes.emplace_back(a.report);
-    check_writes(writes, frames, {a.initial, a.frames.reference_times, a.frames.source_times});
-    frames = with_scalar_sources(std::move(frames), a.colormap, console);
+    check_writes(writes, frames, given_files(a.frames, a.initial));
+    const Frames raw = with_scalar_sources(std::move(frames), a.colormap, console);
+    frames = with_straight_rows(raw, readout, initial);
 
     RunFacts run{"xcalib-cli", console.arguments, std::filesystem::current_path().string(), 0, {}};
     const std::vector<int> chosen =
@@ -227,6 +250,15 @@ void run(Arguments a, bool has_report, Console& console) {
     if (source_camera) options.source_camera = sized(*source_camera, loaded.frames[0].source);
 
     CalibrationResult result = calibrated(frames, loaded, options, initial, console);
+    const bool finds_readout =
+        a.frames.source_readout == "auto" || a.frames.reference_readout == "auto";
+    if (finds_readout) find_readout(a, raw, loaded, result.rig, console, readout, run);
+    // Which rows of both look the same way is known now.
+    if (readout.any() && (finds_readout || (readout.reference != 0 && !initial))) {
+        frames = with_straight_rows(raw, readout, result.rig);
+        loaded = load(frames, loaded.indices, console);
+        result = calibrated(frames, loaded, options, initial, console);
+    }
     if (a.refine_plane) {
         std::vector<ImageView> references, sources;
         for (const int i : frames_to_judge_plane(static_cast<int>(loaded.frames.size()))) {
@@ -292,8 +324,8 @@ void add_calibrate(CLI::App& app, Console& console) {
     CLI::App* command = app.add_subcommand(
         "calibrate", "Estimate both cameras and their pose, and write a rig file.");
     command->footer("The rig is written even if it is not to be trusted (exit code 3).");
-    auto arguments = std::make_shared<Arguments>();
-    Arguments& a = *arguments;
+    auto arguments = std::make_shared<CalibrateArguments>();
+    CalibrateArguments& a = *arguments;
     add_frames(*command, a.frames);
     command->add_option("-o,--output", a.output, "Rig file to write (YAML).")
         ->type_name("RIG")

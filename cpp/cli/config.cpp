@@ -1,14 +1,12 @@
 #include "config.hpp"
 
-#include <yaml-cpp/yaml.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <map>
 #include <set>
 
 #include "xcalib/error.hpp"
-#include "xcalib/stream/files.hpp"
+#include "yaml_keys.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -32,23 +30,6 @@ std::string taken_out(std::vector<std::string>& arguments) {
     return "";
 }
 
-std::map<std::string, YAML::Node> read_keys(const std::string& file) {
-    const std::string text = read_file(file);
-    check_text(text, file);
-    std::map<std::string, YAML::Node> keys;
-    try {
-        const YAML::Node root = YAML::Load(text);
-        if (!root.IsMap())
-            throw InputError(file +
-                             ": expected keys and values, one a line: reference, source, "
-                             "depth, ...");
-        for (const auto& item : root) keys[item.first.as<std::string>()] = item.second;
-    } catch (const YAML::Exception& error) {
-        throw InputError(file + ": not YAML: " + error.what());
-    }
-    return keys;
-}
-
 std::string text_of(const std::string& file, const std::string& key, const YAML::Node& value) {
     if (value.IsScalar()) return value.as<std::string>();
     std::string text;
@@ -66,7 +47,7 @@ std::string text_of(const std::string& file, const std::string& key, const YAML:
 std::vector<std::string> with_config(const CLI::App& command, std::vector<std::string> arguments) {
     const std::string file = taken_out(arguments);
     if (file.empty()) return arguments;
-    std::map<std::string, YAML::Node> given = read_keys(file);
+    std::map<std::string, YAML::Node> given = read_keys(file, "reference, source, depth, ...");
 
     // What was typed: options with their values, and words.
     std::vector<std::string> typed, words;

@@ -10,6 +10,9 @@
 #include "xcalib/depth/complete_depth.hpp"
 #include "xcalib/depth/steady_depth.hpp"
 #include "xcalib/stream/arrays.hpp"
+#include "xcalib/stream/files.hpp"
+#include "xcalib/stream/tiff.hpp"
+#include "yaml_keys.hpp"
 
 namespace xcalib::cli {
 namespace {
@@ -123,6 +126,32 @@ std::optional<double> number_of(const std::string& spec) {
     return value;
 }
 
+// `baseline` [m], `focal` [px] and, if not 0, `doffs` [px] of a YAML file.
+void read_stereo_calibration(const std::string& file, DepthUnits& units) {
+    if (units.baseline != 0 || units.focal != 0 || units.doffs != 0)
+        throw InputError("--stereo-calibration " + file +
+                         ": expected no other stereo options with it");
+    if (!fs::is_regular_file(file))
+        throw InputError(file + ": no such file, expected a stereo calibration (.yaml)");
+    const std::string names = "baseline, focal, doffs";
+    const std::map<std::string, YAML::Node> keys = read_keys(file, names);
+    for (const char* key : {"baseline", "focal"})
+        if (!keys.count(key)) throw InputError(file + ": " + key + " is missing");
+    for (const auto& [key, value] : keys) {
+        double* const field = key == "baseline" ? &units.baseline
+                              : key == "focal"  ? &units.focal
+                              : key == "doffs"  ? &units.doffs
+                                                : nullptr;
+        if (!field) throw InputError(file + ": unknown key '" + key + "', expected " + names);
+        const std::string text = value.IsScalar() ? value.Scalar() : "";
+        const std::optional<double> number = number_of(text);
+        if (!number) throw InputError(file + ": " + key + " is '" + text + "', expected a number");
+        *field = *number;
+    }
+    if (units.baseline == 0)  // which stands for depth, not disparity
+        throw InputError(file + ": stereo baseline is 0, expected above 0 m");
+}
+
 DepthPointer open_given(const DepthArguments& arguments, const FrameList& references,
                         const std::vector<int>& used) {
     std::string spec = arguments.spec;
@@ -133,11 +162,14 @@ DepthPointer open_given(const DepthArguments& arguments, const FrameList& refere
     DepthUnits units = arguments.units;
     if (spec.rfind(kDisparity, 0) == 0) {
         spec.erase(0, kDisparity.size());
+        if (!arguments.stereo_calibration.empty())
+            read_stereo_calibration(arguments.stereo_calibration, units);
         if (units.baseline == 0 || units.focal == 0)
             throw InputError(
                 "--depth disparity: expected --stereo-baseline and --stereo-focal,"
                 " or --stereo-calibration");
-    } else if (units.baseline != 0 || units.focal != 0 || units.doffs != 0) {
+    } else if (units.baseline != 0 || units.focal != 0 || units.doffs != 0 ||
+               !arguments.stereo_calibration.empty()) {
         throw InputError("depth " + spec +
                          ": stereo options go with --depth stereo:FOLDER or"
                          " disparity:FOLDER");
@@ -176,6 +208,8 @@ Picture read_numbers(const Path& file) {
     if (is_png(file) && depth != CV_16U)
         throw InputError(file.string() + ": depth is " + type_name(depth) +
                          ", expected a 16-bit PNG");
+    if (depth == CV_64F && tiff_pixel_type(read_file(file)) == "uint32")
+        throw InputError(file.string() + ": depth is uint32, expected floats in metres");
     if (depth == CV_64F || depth == CV_16F) values.convertTo(values, CV_32F);
     if (values.depth() != CV_16U && values.depth() != CV_32F)
         throw InputError(file.string() + ": depth is " + type_name(depth) +

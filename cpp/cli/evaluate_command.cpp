@@ -12,7 +12,7 @@
 namespace xcalib::cli {
 namespace {
 
-struct Arguments {
+struct EvaluateArguments {
     std::string rig, json_file, registered, colormap = "auto";
     FrameArguments frames;
     int width = 640, threads = 0;
@@ -37,14 +37,14 @@ StreamPointer given_images(const std::string& spec, const Frames& frames) {
                      std::to_string(frames.size()) + " reference frames, of its name");
 }
 
-void run(const Arguments& a, bool has_json, Console& console) {
+void run(const EvaluateArguments& a, bool has_json, Console& console) {
+    const Readout readout = readout_of(a.frames);
     const Rig rig = load_rig(a.rig, console);
     Frames frames = open_frames(a.frames, rig, console);
-    if (has_json)
-        check_writes({a.json_file}, frames,
-                     {a.rig, a.frames.reference_times, a.frames.source_times});
+    if (has_json) check_writes({a.json_file}, frames, given_files(a.frames, a.rig));
     if (a.frames.dry_run) return say_plan(frames, {a.json_file}, {}, console);
     frames = with_scalar_sources(std::move(frames), a.colormap, console);
+    frames = with_straight_rows(std::move(frames), readout, rig);
     const StreamPointer given = a.registered.empty() ? nullptr : given_images(a.registered, frames);
     Evaluator evaluator(rig, a.width, a.threads);
     std::vector<std::string> files;
@@ -74,8 +74,8 @@ void add_evaluate(CLI::App& app, Console& console) {
     CLI::App* command = app.add_subcommand(
         "evaluate",
         "Score the registered SOURCE against REFERENCE, beside the source that is only resized.");
-    auto arguments = std::make_shared<Arguments>();
-    Arguments& a = *arguments;
+    auto arguments = std::make_shared<EvaluateArguments>();
+    EvaluateArguments& a = *arguments;
     command->add_option("RIG", a.rig)->required()->check(kNamed);
     add_frames(*command, a.frames);
     command

@@ -39,6 +39,14 @@ cv::Mat counts_of(FlirParts parts, const std::string& where) {
 
 bool is_radiometric(const Path& file) { return parts_of(file).has_value(); }
 
+Rig radiometric_alignment(const Path& file) {
+    const std::optional<FlirParts> parts = parts_of(file);
+    if (!parts)
+        throw InputError(file.string() +
+                         ": no rig file and no radiometric JPEG of a FLIR camera, expected either");
+    return flir_alignment(*parts, file.string());
+}
+
 std::string RadiometricFiles::where(int index) const {
     return ImageFiles::where(index) + " (" + part_ + ")";
 }

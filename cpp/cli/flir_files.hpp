@@ -5,6 +5,7 @@
 #include <string>
 
 #include "footage.hpp"
+#include "xcalib/camera.hpp"
 
 namespace xcalib::cli {
 
@@ -13,6 +14,9 @@ inline constexpr std::array<const char*, 3> kRadiometricParts = {"visible", "the
                                                                  "temperature"};
 
 bool is_radiometric(const Path& file);
+
+// The camera's own alignment of its images, as a rig. Throws InputError where there is none.
+Rig radiometric_alignment(const Path& file);
 
 class RadiometricFiles : public ImageFiles {
    public:

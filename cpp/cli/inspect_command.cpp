@@ -13,7 +13,8 @@ namespace xcalib::cli {
 namespace {
 
 void run(const std::string& file, bool as_json, Console& console) {
-    if (has_suffix(file, {".bag", ".mcap", ".db3"}) || std::filesystem::is_directory(file))
+    if (has_suffix(file, {".bag", ".mcap", ".db3"}) ||
+        std::filesystem::exists(Path(file) / "metadata.yaml"))
         throw InputError(file +
                          ": bags are inspected by the Python command, `xcalib inspect`; expected a"
                          " rig file");

@@ -14,6 +14,7 @@
 
 #include "commands.hpp"
 #include "config.hpp"
+#include "wrong_words.hpp"
 #include "xcalib/error.hpp"
 #include "xcalib/stream/files.hpp"
 #include "xcalib/stream/interrupts.hpp"
@@ -29,14 +30,30 @@ constexpr const char* kAbout =
     "Exit codes: 0 done and trusted, 1 failed, 2 wrong usage or input, 3 done, but the result is\n"
     "not to be trusted.\n";
 
+std::string names_of_commands(const std::vector<const CLI::App*>& commands) {
+    std::string text;
+    for (const CLI::App* command : commands)
+        text += (text.empty()                 ? ""
+                 : command == commands.back() ? " or "
+                                              : ", ") +
+                command->get_name();
+    return text;
+}
+
 // Without it the message would be that a command is missing.
 void check_command(const CLI::App& app, int argc, char** argv) {
     const auto first = std::find_if(argv + 1, argv + argc, [](char* word) { return *word != '-'; });
-    if (first == argv + argc) return;
+    if (first == argv + argc) {
+        for (char** word = argv + 1; word != argv + argc; ++word)
+            if (!app.get_option_no_throw(*word))
+                throw xcalib::InputError("No such option '" + std::string(*word) + "'");
+        return;
+    }
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
     if (std::none_of(commands.begin(), commands.end(),
                      [&](const CLI::App* command) { return command->check_name(*first); }))
-        throw xcalib::InputError("No such command '" + std::string(*first) + "'.");
+        throw xcalib::InputError("No such command '" + std::string(*first) + "', expected " +
+                                 names_of_commands(commands));
 }
 
 int run(int argc, char** argv, Console& console) {
@@ -60,19 +77,31 @@ int run(int argc, char** argv, Console& console) {
     std::vector<std::string> arguments(argv + 1, argv + argc);
     const auto name = std::find_if(arguments.begin(), arguments.end(),
                                    [](const std::string& word) { return word[0] != '-'; });
-    if (name != arguments.end() && std::any_of(name, arguments.end(), [](const std::string& word) {
-            return word.rfind("--config", 0) == 0;
-        })) {
-        const std::vector<std::string> given(name + 1, arguments.end());
-        const std::vector<std::string> own = with_config(*app.get_subcommand(*name), given);
+    const CLI::App* command = nullptr;
+    if (name != arguments.end()) {
+        command = app.get_subcommand(*name);
+        std::vector<std::string> own(name + 1, arguments.end());
+        if (std::any_of(own.begin(), own.end(),
+                        [](const std::string& word) { return word.rfind("--config", 0) == 0; }))
+            own = with_config(*command, own);
+        const std::string unknown = unknown_option(app, *command, own);
+        if (!unknown.empty()) throw xcalib::InputError(no_such_option(*command, unknown));
         arguments.erase(name + 1, arguments.end());
         arguments.insert(arguments.end(), own.begin(), own.end());
     }
+    const std::string usage = command ? "; expected " + usage_of(*command) : "";
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
     try {
         app.parse(std::move(arguments));
     } catch (const CLI::Success& wanted) {  // help, version
         return app.exit(wanted);
+    } catch (const CLI::ConversionError& error) {
+        throw xcalib::InputError(std::string(error.what()) + ", expected a number");
+    } catch (const CLI::ExtrasError& error) {
+        throw xcalib::InputError(error.what() + usage);
+    } catch (const CLI::RequiredError& error) {
+        const std::string text = error.what();
+        throw xcalib::InputError(text + (text[0] == '-' ? "" : usage));
     } catch (const CLI::ParseError& error) {
         throw xcalib::InputError(error.what());
     }

@@ -4,8 +4,11 @@
 #include <sstream>
 
 #include "depth.hpp"
+#include "flir_files.hpp"
 #include "footage.hpp"
+#include "motion.hpp"
 #include "xcalib/rig_file.hpp"
+#include "xcalib/stream/files.hpp"
 #include "xcalib/stream/oriented.hpp"
 #include "xcalib/stream/pairs.hpp"
 #include "xcalib/stream/plan.hpp"
@@ -13,6 +16,8 @@
 namespace xcalib::cli {
 
 Rig load_rig(const std::string& file, Console& console) {
+    const std::string suffix = lower_suffix(file);
+    if (suffix == ".jpg" || suffix == ".jpeg") return radiometric_alignment(file);
     const Rig rig = xcalib::load_rig(file);
     for (const std::string& line : implausible(rig)) console.warn(file + ": " + line);
     return rig;
@@ -54,6 +59,35 @@ Frames with_scalar_sources(Frames frames, const std::string& colormap, Console& 
     frames.all_sources = scalar_sources(frames.all_sources, colormap, said);
     frames.sources = picked(frames.all_sources, frames.partners);
     if (!said.empty()) console.note(said);
+    return frames;
+}
+
+std::vector<std::filesystem::path> given_files(const FrameArguments& arguments,
+                                               const std::string& rig) {
+    return {rig, arguments.reference_times, arguments.source_times,
+            arguments.depth.stereo_calibration};
+}
+
+Readout readout_of(const FrameArguments& arguments, bool may_be_auto) {
+    const std::optional<double> source =
+                                    parse_readout("--source-readout", arguments.source_readout),
+                                reference = parse_readout("--reference-readout",
+                                                          arguments.reference_readout);
+    if (!may_be_auto && !(source && reference))
+        throw InputError(std::string(source ? "--reference-readout" : "--source-readout") +
+                         " auto: expected the share that calibrate has found");
+    if (!source && !reference)
+        throw InputError(
+            "--source-readout auto --reference-readout auto: only how they differ can be seen; "
+            "expected a share for one of them");
+    return {source.value_or(0), reference.value_or(0)};
+}
+
+Frames with_straight_rows(Frames frames, const Readout& readout, const std::optional<Rig>& rig,
+                          bool nearest) {
+    if (!readout.any()) return frames;
+    frames.all_sources = straightened(frames.all_sources, readout, rig, motion_between, nearest);
+    frames.sources = picked(frames.all_sources, frames.partners);
     return frames;
 }
 

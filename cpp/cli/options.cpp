@@ -94,9 +94,20 @@ void add_footage(CLI::App& command, FrameArguments& arguments) {
         ->type_name("HOW")
         ->check(CLI::IsMember({"ignore", "apply"}))
         ->capture_default_str();
+    const auto readout = [&command](const char* flag, const char* camera, std::string& share) {
+        command
+            .add_option(flag, share,
+                        std::string("Rolling shutter of the ") + camera +
+                            ": the time from its first row to its last, as a share of that from"
+                            " frame to frame, 0 to 1; auto: calibrate finds it from what moves.")
+            ->type_name("SHARE")
+            ->capture_default_str();
+    };
+    readout("--source-readout", "source", arguments.source_readout);
+    readout("--reference-readout", "reference", arguments.reference_readout);
     group(command, "Footage and pairing",
           {"--pair", "--time-offset", "--max-gap", "--reference-times", "--source-times",
-           "--exif-orientation"});
+           "--exif-orientation", "--source-readout", "--reference-readout"});
 }
 
 }  // namespace
@@ -129,6 +140,11 @@ void add_rare_depth(CLI::App& command, DepthArguments& arguments) {
                     "Disparity: principal point of the right camera minus the left's [px]."
                     "  [default: 0]")
         ->type_name("PX");
+    command
+        .add_option("--stereo-calibration", arguments.stereo_calibration,
+                    "Disparity: YAML file with `baseline` [m], `focal` [px] and `doffs` [px].")
+        ->type_name("FILE")
+        ->check(kNamed);
     number("--completion-confidence", arguments.completion_confidence, "F",
            "Complete: filled pixels below this confidence stay unknown, 0 to 1.");
     add_python_only(
@@ -136,10 +152,10 @@ void add_rare_depth(CLI::App& command, DepthArguments& arguments) {
         {"--depth-recipe", "--depth-focal", "--inverse-scale", "--inverse-shift", "--providers"},
         "networks are run");
     add_python_only(command, {"--lidar-calibration"}, "lidar scans are read");
-    add_python_only(command, {"--stereo-calibration"}, "stereo calibrations are read");
     group(command, "Depth by a plane, a network, lidar or stereo",
           {"--camera-height", "--horizon", "--far", "--plane-hfov", "--plane-roll",
-           "--stereo-baseline", "--stereo-focal", "--stereo-doffs", "--completion-confidence"});
+           "--stereo-calibration", "--stereo-baseline", "--stereo-focal", "--stereo-doffs",
+           "--completion-confidence"});
 }
 
 const CLI::Validator kNamed(

@@ -20,6 +20,7 @@ namespace xcalib::cli {
 struct DepthArguments {
     std::string spec;
     DepthUnits units;
+    std::string stereo_calibration;  // a file with the three numbers of disparities
     PlaneDepth plane;
     bool steady = false, complete = false;
     double completion_confidence = kCompletionConfidence;
@@ -33,6 +34,7 @@ struct FrameArguments {
     std::optional<double> max_gap;
     std::string reference_times, source_times;
     std::string exif_orientation = "ignore";
+    std::string source_readout = "0", reference_readout = "0";
     bool dry_run = false;
 };
 

@@ -36,6 +36,15 @@ bool is_truncated(std::string_view data) {
     return at >= data.size() || data.find("\xff\xd9"sv, at) == std::string_view::npos;
 }
 
+// Doubles of what was decoded as signed but is not.
+cv::Mat unsigned_of(const cv::Mat& counts) {
+    cv::Mat numbers(counts.size(), CV_64F);
+    for (int y = 0; y < counts.rows; ++y)
+        for (int x = 0; x < counts.cols; ++x)
+            numbers.at<double>(y, x) = static_cast<std::uint32_t>(counts.at<std::int32_t>(y, x));
+    return numbers;
+}
+
 }  // namespace
 
 ImageView view_of(const cv::Mat& pixels) {
@@ -72,6 +81,7 @@ cv::Mat as_image(cv::Mat pixels, const std::string& where) {
         cv::mixChannels({pixels}, {colour}, {0, 0, 1, 1, 2, 2});
         pixels = colour;
     }
+    if (pixels.depth() == CV_32S) pixels.convertTo(pixels, CV_32F);
     if (pixels.depth() != CV_8U && pixels.depth() != CV_16U && pixels.depth() != CV_32F)
         throw InputError(where + ": pixels are " + type_name(pixels.depth()) +
                          ", expected uint8, uint16 or float32");
@@ -103,6 +113,7 @@ cv::Mat decode(const Path& file) {
 cv::Mat decode_bytes(std::string data, const std::string& name) {
     forget_tiff_orientation(data);
     put_full_page_first(data, name);
+    const bool is_unsigned = put_as_signed(data);
     cv::Mat pixels;
     if (!data.empty() && !is_truncated(data)) {
         try {
@@ -118,6 +129,7 @@ cv::Mat decode_bytes(std::string data, const std::string& name) {
     if (pixels.empty())
         throw DecodeError(name + ": cannot decode " + std::to_string(data.size()) +
                           " bytes, truncated or not an image");
+    if (is_unsigned && pixels.type() == CV_32SC1) pixels = unsigned_of(pixels);
     return pixels;
 }
 

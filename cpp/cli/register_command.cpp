@@ -13,11 +13,16 @@ namespace {
 
 void run(RegisterArguments a, Console& console) {
     a.options.registrar.occlusion = value_of<Occlusion>("--occlusion", a.occlusion);
+    const Readout readout = readout_of(a.frames);
     const Rig rig = load_rig(a.rig, console);
     Registration totals;
     DepthPointer depth;  // of files
     check_output_writable(a.output);
     if (a.live) {
+        if (readout.any())
+            throw InputError(
+                "--source-readout and --reference-readout need the frame after each, which --live "
+                "does not wait for; expected neither");
         // What a camera shows is not to be had again: there is nothing to go on with.
         std::error_code none;
         const auto noted = std::filesystem::file_size(journal_of(a.output), none);
@@ -35,7 +40,8 @@ void run(RegisterArguments a, Console& console) {
         totals = register_live(a, rig, console);
     } else {
         if (a.depth_fd >= 0) throw InputError("--depth-fd goes with --live");
-        const Frames frames = open_frames(a.frames, rig, console);
+        const Frames frames = with_straight_rows(open_frames(a.frames, rig, console), readout, rig,
+                                                 a.options.registrar.nearest);
         if (a.frames.dry_run) return say_plan(frames, {a.output}, {}, console);
         totals = register_files(a, frames, rig, console);
         depth = frames.depth;
@@ -46,6 +52,7 @@ void run(RegisterArguments a, Console& console) {
     console.result({{"frames", totals.frames},
                     {"earlier", totals.earlier},
                     {"valid_share", share},
+                    {"not_finite_source_pixels", totals.not_finite},
                     {"frames_per_second", totals.made ? Json(totals.speed()) : Json(nullptr)},
                     {"output", a.output}});
     if (totals.valid == 0) throw NotTrusted("no pixel of " + a.output + " is valid; see its masks");
@@ -74,6 +81,7 @@ void add_register(CLI::App& app, Console& console) {
         ->type_name("OUT")
         ->required();
     command->add_flag("--overlay", a.options.overlays, "Also write red-cyan overlays/.");
+    add_python_only(*command, {"--workers", "--scheduler"}, "several workers are used");
     command->add_flag("--overwrite", a.options.overwrite,
                       "Start again from the first frame.  [default: go on where an interrupted run "
                       "of the same command"

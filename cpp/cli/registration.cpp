@@ -3,6 +3,7 @@
 #include <charconv>
 
 #include "encoder.hpp"
+#include "open_frames.hpp"
 #include "xcalib/footage/fingerprint.hpp"
 #include "xcalib/stream/files.hpp"
 
@@ -52,6 +53,7 @@ MadeWith inputs_of(const FrameArguments& frames) {
             {"depth", depth_text(depth.spec)},
             {"depth_scale", text_of(depth.units.scale, "by type")},
             {"depth_invalid", texts_of(depth.units.invalid)},
+            {"stereo_calibration", table_text(depth.stereo_calibration)},
             {"stereo_baseline", text_of(depth.units.baseline)},
             {"stereo_focal", text_of(depth.units.focal)},
             {"stereo_doffs", text_of(depth.units.doffs)},
@@ -68,7 +70,9 @@ MadeWith inputs_of(const FrameArguments& frames) {
             {"max_gap", text_of(frames.max_gap, "none")},
             {"reference_times", table_text(frames.reference_times)},
             {"source_times", table_text(frames.source_times)},
-            {"exif_orientation", frames.exif_orientation}};
+            {"exif_orientation", frames.exif_orientation},
+            {"source_readout", frames.source_readout},
+            {"reference_readout", frames.reference_readout}};
 }
 
 }  // namespace
@@ -78,8 +82,7 @@ Registration register_files(const RegisterArguments& arguments, const Frames& fr
     FfmpegCodecs codecs;
     return register_frames(
         frames, rig, arguments.output, arguments.options, "xcalib-cli", inputs_of(arguments.frames),
-        {arguments.rig, arguments.frames.reference_times, arguments.frames.source_times}, codecs,
-        [&](const Registration& now) {
+        given_files(arguments.frames, arguments.rig), codecs, [&](const Registration& now) {
             console.show("registering", static_cast<double>(now.earlier + now.made) / now.frames,
                          now.line());
         });

@@ -68,6 +68,16 @@ InputError where it is another array.)");
         py::arg("data"), py::arg("name"),
         "The bytes of a TIFF file with the page of full size first, as of one that begins with a "
         "thumbnail; InputError, naming the file, where several pages are of that size.");
+    m.def(
+        "as_signed",
+        [](const std::string& data) {
+            std::string file = data;
+            const bool is_unsigned = put_as_signed(file);
+            return std::make_pair(is_unsigned, py::bytes(file));
+        },
+        py::arg("data"),
+        "Whether a TIFF file has unsigned 32-bit pixels, and its bytes with these said to be "
+        "signed, as OpenCV decodes them.");
     m.def("video_line", &video_line, py::arg("name"), py::arg("times"), py::arg("announced"),
           py::arg("rate"),
           "A line where fewer frames were decoded than the header announces, though they reach to "

@@ -23,6 +23,14 @@ void bind_flir(py::module_& m) {
                       "Of the thermal image from the visible one's middle [px of it].")
         .def_readonly("offset_y", &FlirParts::offset_y, "The same, down.")
         .def(
+            "alignment",
+            [](const FlirParts& parts, const std::string& name) {
+                return flir_alignment(parts, name);
+            },
+            py::arg("name"),
+            "The rig that the camera's own alignment is: a start, with a reference of 45 deg of"
+            " field of view. InputError, naming `name`, where the file does not say.")
+        .def(
             "celsius",
             [](const FlirParts& parts, const py::object& counts) -> py::object {
                 if (!parts.planck) return py::none();

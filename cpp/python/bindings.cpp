@@ -59,6 +59,7 @@ PYBIND11_MODULE(_core, m) {
     xcalib::bind_pairs(m);
     xcalib::bind_frames(m);
     xcalib::bind_lags(m);
+    xcalib::bind_straightened(m);
     xcalib::bind_files(m);
     xcalib::bind_register_frames(m);
 

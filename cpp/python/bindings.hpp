@@ -37,6 +37,7 @@ void bind_pairs(pybind11::module_& m);
 void bind_sequence(pybind11::module_& m);
 void bind_frames(pybind11::module_& m);
 void bind_lags(pybind11::module_& m);
+void bind_straightened(pybind11::module_& m);
 void bind_register_frames(pybind11::module_& m);
 
 void bind_evaluate(pybind11::module_& m);

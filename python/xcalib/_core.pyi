@@ -1023,6 +1023,10 @@ class FlirParts:
     @property
     def offset_y(self) -> float:
         """The same, down."""
+    def alignment(self, name: str) -> Rig:
+        """The rig that the camera's own alignment is: a start, with a reference of 45 deg of field
+        of view. InputError, naming `name`, where the file does not say.
+        """
     def celsius(self, counts: NDArray[Any]) -> NDArray[float32] | None:
         """(H, W) float32, degrees Celsius of a black body; None where the file does not say."""
 
@@ -1481,6 +1485,16 @@ class Pairs:
 def is_video(output: str | PathLike[str]) -> bool:
     """Whether an output of this name is a video."""
 
+def frame_names(references: Stream, sources: Stream, depth: Any) -> list[tuple[str, str]]:
+    """(key, name) of each frame; the key changes with the files that the frame is made of: their
+    names, sizes and times.
+    """
+
+def frame_rate(references: Stream) -> float:
+    """Of a video of these frames [frames/s]: by the median of their times; 25 where they have
+    none.
+    """
+
 def journal_of(output: str | PathLike[str]) -> Path:
     """Where the journal of an output is: in the folder, or beside the video, named after it."""
 
@@ -1555,6 +1569,71 @@ def joined_line(images: Iterable[NDArray[Any]], name: str) -> str:
     or side by side; else ''. name: REFERENCE or SOURCE.
     """
 
+class ReadoutFit:
+    """What fit_readout() found."""
+
+    @property
+    def share(self) -> float:
+        """Of the time from frame to frame."""
+    @property
+    def taken(self) -> float:
+        """To give to the option: at most 1."""
+    @property
+    def error(self) -> float:
+        """Standard error of the share."""
+    @property
+    def seen(self) -> bool:
+        """Whether there is one, and not by chance."""
+    @property
+    def shares(self) -> list[float]:
+        """That were tried."""
+    @property
+    def nec(self) -> list[list[float]]:
+        """Of each frame at each of the shares."""
+    def line(self, camera: str) -> str:
+        """In words."""
+
+def parse_readout(option: str, text: str) -> float | None:
+    """The share, 0 to 1, that an option says; None for 'auto'. Raises InputError."""
+
+def straightened(
+    sources: Stream,
+    source: float,
+    reference: float,
+    rig: Rig | None,
+    motion: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]],
+    nearest: bool = False,
+) -> Stream:
+    """Source frames whose rows are brought to the time of the reference's, as they are read.
+
+    source, reference: from the first row's reading to the last one's, in shares of the time
+    from frame to frame; both 0 give the stream itself. rig: which rows look the same way;
+    None: the rows of both, upright. motion: a function of two (H, W) uint8 frames that gives
+    (H, W, 2) float32 [px], where what the first shows stands in the second. nearest: pixels
+    are taken as they are, else cubic. Raises InputError where the frames do not follow each
+    other.
+    """
+
+def fit_readout(
+    references: Sequence[NDArray[Any]],
+    depths: Sequence[NDArray[Any]],
+    partners: Sequence[int],
+    all_sources: Stream,
+    rig: Rig,
+    options: CalibrationOptions,
+    source: float,
+    reference: float,
+    of_reference: bool,
+    motion: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]],
+    progress: Callable[[float], None],
+) -> ReadoutFit:
+    """The readout of a camera, as the fit of rig to a dozen of the frames shows it.
+
+    partners: the indices of their sources in all_sources, as they were read. source,
+    reference: what is known of the readouts; what is found comes to that of the source, or of
+    the reference if of_reference.
+    """
+
 def frames_later(
     all_sources: Stream, partners: Sequence[int], lag: int
 ) -> tuple[list[int], list[int]]:
@@ -1584,6 +1663,11 @@ def read_array(file: str | PathLike[str], is_image: bool) -> NDArray[Any] | None
 def with_full_page_first(data: bytes, name: str) -> bytes:
     """The bytes of a TIFF file with the page of full size first, as of one that begins with a
     thumbnail; InputError, naming the file, where several pages are of that size.
+    """
+
+def as_signed(data: bytes) -> tuple[bool, bytes]:
+    """Whether a TIFF file has unsigned 32-bit pixels, and its bytes with these said to be signed,
+    as OpenCV decodes them.
     """
 
 def video_line(name: str, times: Sequence[float], announced: float, rate: float) -> str:
@@ -1647,6 +1731,9 @@ class Registration:
     def pixels(self) -> int:
         """Of all frames."""
     @property
+    def not_finite(self) -> int:
+        """Source pixels of the frames of this run that are no number: masked."""
+    @property
     def seconds(self) -> float:
         """That this run took so far."""
     @property
@@ -1656,6 +1743,50 @@ class Registration:
         """While it is under way, in one line."""
     def summary(self) -> str:
         """At its end, in one line."""
+
+class Ledger:
+    """A registration that has begun, whose frames are registered elsewhere."""
+    def __init__(
+        self,
+        references: Stream,
+        sources: Stream,
+        depth: Any,
+        registrar: Registrar,
+        output: str | PathLike[str],
+        overlays: bool,
+        overwrite: bool,
+        inputs: Sequence[tuple[str, str]],
+        other_reads: Sequence[str | PathLike[str]],
+        codecs: object,
+    ) -> None:
+        """As register_frames() begins, with the same refusals: the journal of the output is held
+        until close().
+        """
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """(key, name) of all frames, in order."""
+    @property
+    def there(self) -> dict[str, int]:
+        """Valid pixels of the frames that an earlier run has written, by their keys."""
+    @property
+    def made_with(self) -> list[tuple[str, str]]:
+        """(name, text) of all that the output depends on, but for the frames."""
+    @property
+    def rig(self) -> Rig:
+        """The rig at the size of the images."""
+    def claim(self) -> None:
+        """Before the first file has its name: what is called as this output's files is of this
+        run.
+        """
+    def append(
+        self, units: Sequence[tuple[Sequence[tuple[str, int]], Sequence[tuple[str, int]]]]
+    ) -> None:
+        """Notes that files are whole, a unit (frames, files) for those that are whole only
+        together: frames (key, valid pixels), in order, and files (name from the journal's folder,
+        bytes).
+        """
+    def close(self) -> None:
+        """Lets go of the journal."""
 
 def register_frames(
     references: Stream,
@@ -1671,6 +1802,7 @@ def register_frames(
     codecs: object,
     progress: Callable[[Registration], object],
     hold_interrupts: bool,
+    rate: float = 0.0,
 ) -> Registration:
     """Registers all frames that an earlier run has not written, and returns the Registration.
 
@@ -1681,5 +1813,6 @@ def register_frames(
     codecs: has encode_image(file, image), which returns bytes, encoder_name(), Encoder(file,
     target, first, rate) and join(parts, file, target, rate, check). progress(registration) is
     called in this thread after frames, and a few times a second. hold_interrupts: in the main
-    thread, SIGINT and SIGTERM end the run between two frames, by KeyboardInterrupt.
+    thread, SIGINT and SIGTERM end the run between two frames, by KeyboardInterrupt. rate: of a
+    video [frames/s]; 0: that of the references.
     """

@@ -213,6 +213,12 @@ class NetworkFlow:
             shapes = ", ".join(str(out.shape) for out in outputs)
             raise InputError(f"{self.path}: outputs are {shapes}, expected (1, 2, *{padded})")
         last = flows[-1].reshape(-1, 2, *padded)[-1, :, : inner[1], : inner[0]]
+        if not np.isfinite(last).all(axis=0).any():
+            raise InputError(
+                f"{self.path}: its flow is not a number anywhere; expected other values of its"
+                " images (`range`, `mean`, `std` in the .yaml file beside it), or an export in"
+                " float32"
+            )
         flow: Flow = np.ascontiguousarray(last.transpose(1, 2, 0), dtype=np.float32)
         if inner != (width, height):
             scale = np.array([width / inner[0], height / inner[1]], np.float32)

@@ -25,6 +25,7 @@ from ._core import (
     DecodeError,
     InputError,
     Rig,
+    as_signed,
     as_stored,
     check_file_writable,
     check_folder_writable,
@@ -122,6 +123,8 @@ def as_image(pixels: Image, where: str) -> Image:
     if pixels.ndim == 3:
         # Two and four channels are gray and colour with alpha.
         pixels = pixels[..., 0] if pixels.shape[2] < 3 else pixels[..., :3]
+    if pixels.dtype in (np.int32, np.uint32):
+        pixels = pixels.astype(np.float32)
     if pixels.dtype not in (np.uint8, np.uint16, np.float32):
         raise InputError(f"{where}: pixels are {pixels.dtype}, expected uint8, uint16 or float32")
     return np.ascontiguousarray(pixels)
@@ -162,8 +165,9 @@ def decode(path: Path) -> Image:
 
 def decode_bytes(data: bytes, path: str) -> Image:
     """The same of the bytes of a file; ``path`` names it in messages."""
+    is_unsigned = False
     if data.startswith((b"II*\0", b"MM\0*")):
-        data = with_full_page_first(as_stored(data), path)
+        is_unsigned, data = as_signed(with_full_page_first(as_stored(data), path))
     image = None
     with quiet_opencv(), contextlib.suppress(cv2.error):
         if data and not is_truncated(data):
@@ -173,6 +177,8 @@ def decode_bytes(data: bytes, path: str) -> Image:
         raise InputError(f"{path}: pixels are {kind}, expected uint8, uint16 or float32")
     if image is None:
         raise DecodeError(f"{path}: cannot decode {len(data)} bytes, truncated or not an image")
+    if is_unsigned and image.dtype == np.int32:
+        return image.view(np.uint32)
     return image
 
 

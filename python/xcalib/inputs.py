@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from . import remote
 from .depth import DepthUnits, MeasuredDepth, NetworkOptions, PlaneDepth
 from .footage import Matching
 
@@ -15,7 +16,7 @@ class Inputs:
 
     reference: str | Path
     source: str | Path
-    """Folders or patterns of images, videos, bags; see `footage.open_stream`."""
+    """Folders or patterns of images, videos, bags; see `footage.open_stream`. Or a URL."""
     depth: str | Path
     """A ``--depth`` argument, see `depth.open_depth`."""
     units: DepthUnits = field(default_factory=DepthUnits)
@@ -28,3 +29,15 @@ class Inputs:
     """How to run it, where depth is a network."""
     measured: MeasuredDepth = field(default_factory=MeasuredDepth)
     """Lidar and stereo; completion and averaging over time of any depth."""
+    readout: tuple[float, float] = (0.0, 0.0)
+    """Of the source and the reference, in shares of the time from frame to frame."""
+
+
+def with_local_names(inputs: Inputs) -> Inputs:
+    """The inputs with names on this machine in place of URLs."""
+    return replace(
+        inputs,
+        reference=remote.local_name(inputs.reference),
+        source=remote.local_name(inputs.source),
+        depth=remote.local_name(inputs.depth),
+    )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frames import InputError
+from .onnx_messages import OPENING, RUNNING, in_words
 
 Array = NDArray[Any]
 
@@ -96,7 +98,7 @@ class Network:
         try:
             self._session = onnxruntime.InferenceSession(str(path), options, providers=wanted)
         except Exception as error:  # its exceptions have no common base
-            raise InputError(f"{path}: {_reason(str(error))}") from None
+            raise InputError(f"{path}: {in_words(str(error), OPENING)}") from None
         # ONNX Runtime falls back to the CPU in silence where a driver is missing.
         lost = set(wanted) - set(self._session.get_providers())
         if lost:
@@ -116,7 +118,9 @@ class Network:
             values = self._session.run(list(outputs), dict(feeds))
         except Exception as error:
             shapes = ", ".join(f"{name} {value.shape}" for name, value in feeds.items())
-            raise InputError(f"{self.path}: cannot run on {shapes}: {_brief(str(error))}") from None
+            raise InputError(
+                f"{self.path}: cannot run on {shapes}: {in_words(str(error), RUNNING)}"
+            ) from None
         return [np.asarray(value, np.float32) for value in values]
 
     def output(self, which: str | int) -> Tensor:
@@ -127,6 +131,23 @@ class Network:
         if which in names:
             return self.outputs[names.index(str(which))]
         raise InputError(f"{self.path}: no output {which!r}, expected one of {', '.join(names)}")
+
+
+def open_network(
+    path: str | Path, providers: str | Sequence[str] = "cpu", num_threads: int = 0
+) -> Network:
+    """A `Network` that a process opens once, however many drives use it."""
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file")
+    about = Path(path).stat()
+    names = providers if isinstance(providers, str) else ",".join(providers)
+    mark = about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns
+    return _opened(str(path), mark, names, num_threads)
+
+
+@lru_cache(maxsize=2)
+def _opened(path: str, mark: tuple[int, ...], providers: str, num_threads: int) -> Network:
+    return Network(path, providers, num_threads)
 
 
 @dataclass(frozen=True)
@@ -192,18 +213,3 @@ class ImageInput:
 def _tensor(node: Any) -> Tensor:
     shape = tuple(side if isinstance(side, int) and side > 0 else None for side in node.shape)
     return Tensor(node.name, shape, node.type)
-
-
-def _brief(message: str) -> str:
-    """What ONNX Runtime says, without its error codes."""
-    return message.split(" : ", 3)[-1].strip()
-
-
-def _reason(message: str) -> str:
-    if "External data" in message or "external data" in message:
-        return f"a file of its weights is missing or not readable beside it: {_brief(message)}"
-    if "not a registered function/op" in message:
-        return f"needs operators that ONNX Runtime does not have: {_brief(message)}"
-    if "INVALID_PROTOBUF" in message or "No graph was found" in message:
-        return "not an ONNX model, or truncated"
-    return f"ONNX Runtime cannot open it: {_brief(message)}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,18 +15,21 @@ from ._core import (
     CalibrationOptions,
     CalibrationResult,
     Choice,
+    ReadoutFit,
     Rig,
     TimeOffset,
     add_lags,
     calibrate,
     distrust,
     draw_frames,
+    fit_readout,
     frames_later,
     frames_to_judge_plane,
     joined_line,
     load_frames,
     look_at_lags,
     orientation_line,
+    straightened,
     with_file_name,
 )
 from .choose import choose_informed
@@ -36,9 +39,13 @@ from .footage import Picked, Stream, TopicDepth, open_matched_depth, open_pairs
 from .footage.bag import clock_line
 from .footage.opening import PickedDepth
 from .frames import DecodeError, Image, InputError, fit_rig, size_of
-from .inputs import Inputs
+from .inputs import Inputs, with_local_names
+from .motion import motion_between
 from .progress import progress, stages_bar
 from .thermal import scalar_sources
+
+READOUT_FRAMES = 12
+"""That a readout is found by, at most."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,7 @@ class Frames:
         """Open and pair frames. With a ``rig`` an estimated clock offset is refined, see
         `Pairs.refine`.
         """
+        inputs = with_local_names(inputs)
         pairs = open_pairs(inputs.reference, inputs.source, inputs.matching)
 
         def open_depth(used: list[int]) -> DepthProvider:
@@ -123,6 +131,18 @@ class Frames:
         if every is self.all_sources:
             return self, line
         return replace(self, sources=Picked(every, self.partners), all_sources=every), line
+
+    def with_straight_rows(
+        self, source: float, reference: float, rig: Rig | None, nearest: bool = False
+    ) -> Frames:
+        """The frames with their sources straightened, see `_core.straightened`."""
+        if not source and not reference:
+            return self
+        assert self.all_sources is not None
+        every = straightened(
+            self.all_sources, source, reference, rig, motion_between, nearest=nearest
+        )
+        return replace(self, sources=Picked(every, self.partners), all_sources=every)
 
     def with_lag(self, lag: int, chosen: Sequence[int]) -> tuple[Frames, list[int]]:
         """The frames with the sources ``lag`` frames later, without those that have none, and the
@@ -221,6 +241,34 @@ def run_calibration(
             )
             add_lags(result, lag, frames.offset, frames.all_sources)
     return result, chosen
+
+
+def find_readout(
+    frames: Frames,
+    chosen: Sequence[int],
+    rig: Rig,
+    calibration: CalibrationOptions,
+    known: Mapping[str, float | None],
+    quiet: bool = False,
+) -> ReadoutFit:
+    """What the ``chosen`` frames, to which ``rig`` was fitted, show of a rolling shutter.
+
+    ``known``: the readouts of ``source`` and ``reference``, None for the one that is looked for.
+    The frames' sources are as they were read.
+    """
+    assert frames.all_sources is not None
+    count = min(len(chosen), READOUT_FRAMES)
+    few = [chosen[i * len(chosen) // count] for i in range(count)]
+    read = [(frames.references[index], index) for index in few]
+    with stages_bar(quiet) as show:
+        return fit_readout(
+            [reference for reference, _ in read],
+            [frames.depth(index, reference) for reference, index in read],
+            [frames.partners[index] for index in few],
+            *(frames.all_sources, rig, calibration),
+            *(known["source"] or 0, known["reference"] or 0, known["reference"] is None),
+            *(motion_between, lambda share: show("readout", share)),
+        )
 
 
 def _readable(stream: Stream, chosen: Sequence[int]) -> Iterator[Image]:

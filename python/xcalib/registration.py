@@ -26,6 +26,7 @@ from .depth.constant import distance_of
 from .footage import encoder
 from .pipeline import Frames
 from .progress import Lines
+from .remote import is_url
 
 __all__ = ["Registration", "RegistrationOptions", "run_registration"]
 
@@ -56,6 +57,7 @@ def run_registration(
     inputs: Mapping[str, Any] | None = None,
     quiet: bool = False,
     other_reads: Sequence[Path] = (),
+    rate: float = 0.0,
 ) -> Registration:
     """Register frames and write images, masks and, if asked for, overlays.
 
@@ -67,6 +69,8 @@ def run_registration(
         All that the caller made ``frames`` with, by name: an output of other inputs is refused.
     other_reads
         Files that were read besides those of the frames: nothing that is read is written to.
+    rate
+        Of a video [frames/s]; 0: that of the reference.
 
     Raises
     ------
@@ -91,12 +95,14 @@ def run_registration(
             encoder,
             progress,
             threading.current_thread() is threading.main_thread(),
+            rate,
         )
 
 
 def is_word(depth_spec: str) -> bool:
     """Whether a ``--depth`` argument names no path."""
-    return depth_spec == "plane" or distance_of(depth_spec) is not None
+    is_number = not is_url(depth_spec) and distance_of(depth_spec) is not None
+    return depth_spec == "plane" or is_url(depth_spec) or is_number
 
 
 def described(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:

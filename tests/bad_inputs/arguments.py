@@ -30,6 +30,9 @@ ROWS = [
             "--time-offset soon",
             "--time-offset inf",
             "--time-offset nan",
+            "--source-readout 2",
+            "--source-readout auto",
+            "--reference-readout soon",
             "--no-such-option",
             "--far",
         )
@@ -89,8 +92,19 @@ ROWS = [
             ("--source-colormap none-such", "none-such"),
         )
     ),
-    Row("no-such-command", "undistort rig.yaml", "undistort"),
+    Row(
+        "no-such-command", "undistort rig.yaml", "No such command 'undistort', expected calibrate,"
+    ),
+    Row("no-such-option-at-all", "-v", "No such option '-v'"),
+    Row("misspelt-option", f"{CALIBRATE} --frame 4", "--frames"),
+    Row("misspelt-and-missing", "calibrate visible thermal --ouput r.yaml", "--output"),
     Row("no-rig", "inspect", "RIG"),
     Row("too-many", f"{INSPECT} more.yaml", "more.yaml"),
-    Row("no-source", "register rig.yaml visible --depth plane -o out", "SOURCE"),
+    Row("too-many-words", f"{EVALUATE} more", "expected evaluate RIG REFERENCE SOURCE"),
+    Row(
+        "no-source",
+        "register rig.yaml visible --depth plane -o out",
+        "; expected register RIG REFERENCE SOURCE",
+    ),
+    Row("number-with-a-unit", f"{CALIBRATE} --reference-hfov 90deg", "number"),
 ]

@@ -61,15 +61,9 @@ ROWS = [
     ),
     source("cut-bmp", encoded(".bmp", picture(48, 36, 5))[:30], f"thermal/0.bmp: {CANNOT}", ".bmp"),
     source(
-        "int32-tiff",
-        encoded(".tiff", picture(48, 36, 5).astype(np.int32)),
-        "thermal/0.tiff: pixels are int32, expected uint8, uint16 or float32",
-        ".tiff",
-    ),
-    source(
-        "uint32-tiff",
-        tiff(32, 1),
-        "thermal/0.tiff: pixels are uint32, expected uint8, uint16 or float32",
+        "uint64-tiff",
+        tiff(64, 1),
+        "thermal/0.tiff: pixels are uint64, expected uint8, uint16 or float32",
         ".tiff",
     ),
     source(
@@ -115,6 +109,8 @@ ROWS = [
     ),
     # -- folders and patterns
     opened("none", "none", "none: no such folder"),
+    opened("camera", "0", "0: no such folder; cameras are read by `xcalib-cli register --live`"),
+    opened("address", "rtsp://cam/1", "/cam/1: no such folder; cameras are read by"),
     opened("empty-name", "''", "REFERENCE"),
     opened("a-file", "rig.yaml", "rig.yaml is a file, expected a folder of"),
     opened("an-image", "visible/0.png", "visible/0.png is a file, expected a folder of"),
@@ -179,6 +175,8 @@ ROWS = [
         "depth is uint8, expected floats",
         ".tiff",
     ),
+    depth("uint32-tiff", tiff(32, 1), "depth is uint32, expected floats in metres", ".tiff"),
+    depth("int32-tiff", tiff(32, 2), "depth is int32, expected floats in metres", ".tiff"),
     depth(
         "aspect",
         encoded(".png", np.full((48, 48), 999, np.uint16)),

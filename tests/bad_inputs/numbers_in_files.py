@@ -48,9 +48,21 @@ ROWS = [
     of_rig("comma", "cx: 31.5", "cx: '31,5'", f"reference.cx = 31,5, {FINITE}"),
     of_rig("list", "fx: 60", "fx: [60]", f"(not a single value), {FINITE}"),
     of_rig("digits", "fx: 60", "fx: x" + "1" * 300, f"... (301 characters), {FINITE}"),
+    Row(
+        "rig-many-digits",
+        INSPECT,
+        "1.1111111111111112e+299 is not plausible",
+        files=rig("fx: 60", "fx: " + "1" * 300),
+        code=0,
+    ),
     of_rig("negative-focal", "fx: 60", "fx: -60", "reference: fx = -60"),
     of_rig("zero-focal", "fy: 60", "fy: 0", "reference: fy = 0"),
-    of_rig("width-decimal", "width: 64", "width: 64.0", "width = 64.0, expected a whole number"),
+    of_rig(
+        "width-decimal",
+        "width: 64",
+        "width: 64.0",
+        "width = 64.0, expected a whole number of px, at least 1, as in 640",
+    ),
     of_rig("width-zero", "width: 64", "width: 0", "width = 0, expected a whole number"),
     of_rig("width-negative", "width: 64", "width: -64", "width = -64, expected a whole number"),
     of_rig("width-huge", "width: 64", "width: 99999999999", "width = 99999999999, expected"),
@@ -65,9 +77,9 @@ ROWS = [
     of_rig(
         "section-twice", "version: 1", "version: 1\nreference: {}", "'reference' is given again"
     ),
-    of_rig("no-skew", ", skew: 0", "", "missing field 'skew' in reference, expected width, height"),
+    of_rig("no-skew", ", skew: 0", "", "fx, fy, cx, cy, skew; write skew: 0 for none"),
     of_rig("no-pose", "  translation_m: [-0.1, 0, 0]\n", "", "missing field 'translation_m'"),
-    of_rig("notes", "version: 1", "version: 1\nnotes: mine", "unknown field 'notes' in the file"),
+    of_rig("notes", "version: 1", "version: 1\nnotes: mine", "calibration; notes go behind a #"),
     of_rig("unknown", "fx: 60", "zoom: 2, fx: 60", "unknown field 'zoom' in reference, expected"),
     of_rig(
         "mirrored", "version: 1", "version: 2\nsource_mirrored: maybe", "expected true or false"

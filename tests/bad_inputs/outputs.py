@@ -26,6 +26,12 @@ ROWS = [
         f"thermal {A_FOLDER}",
     ),
     Row(
+        "o-pgm",
+        "register rig.yaml visible gray --depth depth -o gray",
+        f"gray {A_FOLDER}",
+        files={f"gray/{i}.pgm": b"P5 48 36 255\n" + bytes(48 * 36) for i in (0, 1)},
+    ),
+    Row(
         "o-number-pattern",
         "register rig.yaml visible/%d.png thermal --depth depth -o visible",
         f"visible {A_FOLDER}",
@@ -132,6 +138,7 @@ ROWS = [
     Row("o-video-link", f"{SCENE} link.mkv", "link.mkv: it is a link", links={"link.mkv": "w.mkv"}),
     Row("o-video-nowhere", f"{SCENE} link.mkv", "leads nowhere", links={"link.mkv": "none"}),
     Row("o-video-pipe", f"{SCENE} pipe.mkv", "it is a pipe or a device", pipes=("pipe.mkv",)),
+    Row("o-equals", f"{SCENE[:-3]} -o=out", "cannot write to =out: expected -o out (./=out is a"),
     Row("o-missing", f"register rig.yaml {HERE}", "--output"),
     # -- evaluate --json
     Row(
@@ -173,6 +180,12 @@ ROWS = [
         "json-nowhere", f"{EVALUATE} --json link", "link that leads nowhere", links={"link": "none"}
     ),
     Row("json-below-a-file", f"{EVALUATE} --json rig.yaml/x", "is a file, expected a folder"),
+    Row(
+        "json-pipe-unread",
+        f"{EVALUATE} --json pipe",
+        "cannot write to pipe: nobody reads this pipe",
+        pipes=("pipe",),
+    ),
     Row("json-proc", f"{EVALUATE} --json /proc/x.json", "cannot write to /proc: /proc: "),
     # -- calibrate
     Row(
@@ -191,6 +204,7 @@ ROWS = [
         f"but {AN_INPUT} (thermal/1.png)",
         links={"link": "thermal/1.png"},
     ),
+    Row("rig-equals", f"calibrate {HERE} -o=r.yaml", "cannot write to =r.yaml: expected -o r.yaml"),
     Row("rig-empty", f"calibrate {HERE} -o ''", "cannot write to '': the name is empty"),
     Row("rig-folder", f"calibrate {HERE} -o visible", "it is a folder, expected a file name"),
     Row("rig-new-folder", f"calibrate {HERE} -o new/", "that names a folder, expected a file name"),

@@ -50,6 +50,8 @@ class Row:
     """Whether what was whole before is kept in the output."""
     only: str = ""
     """python or cli: what the other one does not have."""
+    api: Callable[[], object] | None = None
+    """The same in Python, where `api.call_of` cannot tell it from the command."""
 
     def words(self) -> list[str]:
         return shlex.split(self.command)

@@ -1,6 +1,6 @@
-"""Bad inputs, which the commands refuse in one line, and which harm nothing.
+"""Bad inputs, which the commands and the API refuse in one line, and which harm nothing.
 
-The commands take turns from row to row; `make test-bad-inputs` runs each row on both.
+The three take turns from row to row; `make test-bad-inputs` runs each row on all that have it.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import journals
 import numbers_in_files
 import outputs
 import pytest
+from api import call_of
 from table import Row, write_scene
 
 from conftest import run
@@ -27,13 +28,18 @@ ROWS = [
     for row in module.ROWS
 ]
 
-COMMANDS = ("python", "cli")
+
+def ways_of(row: Row) -> list[str]:
+    """How the row can be run."""
+    ways = [row.only] if row.only else ["python", "cli"]
+    return [*ways, "api"] if call_of(row) else ways
+
+
 CASES = [
-    pytest.param(row, command, id=f"{row.name}-{command}")
+    pytest.param(row, way, id=f"{row.name}-{way}")
     for i, row in enumerate(ROWS)
-    for command in COMMANDS
-    if row.only == command
-    or (not row.only and ("XCALIB_ALL_ROWS" in os.environ or command == COMMANDS[i % 2]))
+    for j, way in enumerate(ways_of(row))
+    if "XCALIB_ALL_ROWS" in os.environ or j == i % len(ways_of(row))
 ]
 
 
@@ -69,10 +75,10 @@ def ended(command: str, row: Row, binary: Path) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize(("row", "command"), CASES)
+@pytest.mark.parametrize(("row", "way"), CASES)
 def test_is_refused_in_one_line_and_harms_nothing(
     row: Row,
-    command: str,
+    way: str,
     small_scene: Path,
     tmp_path: Path,
     binary: Path,
@@ -82,21 +88,43 @@ def test_is_refused_in_one_line_and_harms_nothing(
     row.spoil(scene)
     monkeypatch.chdir(scene)
     before = state(scene)
-    code, errors = ended(command, row, binary)
-    assert code == row.code, errors
-    assert row.message in errors
-    if code == 0:
-        assert "error" not in errors
-        return
-    *notes, line = errors.splitlines()
-    assert line.startswith("not to be trusted: " if code == 3 else "error: ")
-    assert all(note.startswith(("warning: ", "frames: ", "--depth ")) for note in notes), errors
+    if way == "api":
+        line = raised(row)
+    else:
+        code, errors = ended(way, row, binary)
+        assert code == row.code, errors
+        assert row.message in errors
+        if code == 0:
+            assert "error" not in errors
+            return
+        *notes, line = errors.splitlines()
+        assert line.startswith("not to be trusted: " if code == 3 else "error: ")
+        assert all(note.startswith(("warning: ", "frames: ", "--depth ")) for note in notes), errors
     assert len(line) < 700, line
     for word in ("Traceback", "cv::", "OpenCV(", "std::"):
-        assert word not in errors
-    assert row.leaves or state(scene) == before
+        assert word not in line
+    assert row.code == 0 or row.leaves or state(scene) == before
+
+
+def raised(row: Row) -> str:
+    """The message of the call; '' where it is to go on."""
+    call = call_of(row)
+    assert call is not None
+    if row.code == 0:
+        call()
+        return ""
+    with pytest.raises((ValueError, OSError)) as caught:
+        call()
+    error = caught.value
+    message = str(error)
+    if isinstance(error, OSError) and error.filename:
+        message = f"{error.filename}: {error.strerror}"
+    assert row.message in message
+    assert "\n" not in message
+    return message
 
 
 def test_rows_are_many_and_named_apart() -> None:
     assert len(ROWS) >= 150
+    assert sum("api" in ways_of(row) for row in ROWS) >= 150
     assert len({row.name for row in ROWS}) == len(ROWS)

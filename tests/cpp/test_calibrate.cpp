@@ -8,14 +8,13 @@
 
 #include "refusal.hpp"
 #include "scenes.hpp"
+#include "views.hpp"
 #include "xcalib/calibrate.hpp"
 
 namespace xcalib {
 namespace {
 
 using namespace ::xcalib::testing;  // NOLINT: scenes.hpp, refusal.hpp
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // --- Options
 // --------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@
 #include "refusal.hpp"
 #include "same_rig.hpp"
 #include "scenes.hpp"
+#include "views.hpp"
 #include "xcalib/camera.hpp"
 
 namespace xcalib {
@@ -15,13 +16,13 @@ namespace {
 
 using ::xcalib::testing::expect_same;
 using ::xcalib::testing::has;
+using ::xcalib::testing::kInfinity;
+using ::xcalib::testing::kNaN;
 using ::xcalib::testing::random_rig;
 using ::xcalib::testing::refusal;
 using ::xcalib::testing::uniform;
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 const Pinhole kCamera{640, 480, 500, 400, 320, 240, 10};
 
@@ -107,7 +108,7 @@ TEST(Camera, FieldOfViewOf90DegreesHasAFocalLengthOfHalfTheWidth) {
 }
 
 TEST(Camera, ImpossibleFieldsOfViewAreRefused) {
-    for (const double hfov : {0.0, -1.0, kPi, 4.0, kNaN})
+    for (const double hfov : {0.0, -1.0, kPi, 4.0, double{kNaN}})
         EXPECT_TRUE(has(refusal([&] { Pinhole::from_hfov(640, 480, hfov); }), "hfov"));
 }
 

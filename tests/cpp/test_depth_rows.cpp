@@ -110,10 +110,6 @@ std::vector<T> some_depth(std::mt19937& random, int width, int height, double sc
     return out;
 }
 
-struct Size {
-    int width, height;
-};
-
 // Returns how many pixels were of depths that differ, so that a rule had to decide.
 template <class T>
 int expect_by_the_rule(std::mt19937& random, const Size& from, const Size& to, double scale) {

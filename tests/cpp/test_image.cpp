@@ -21,6 +21,7 @@ using ::xcalib::testing::has;
 using ::xcalib::testing::kInfinity;
 using ::xcalib::testing::kNaN;
 using ::xcalib::testing::refusal;
+using ::xcalib::testing::Size;
 using ::xcalib::testing::view_of;
 
 // --- Depth
@@ -42,9 +43,6 @@ TEST(CleanDepth, RowsMayHaveGapsAndOtherTypesAreRefused) {
         has(refusal([&] { clean_depth(view_of(colour, 2, 2, 3)); }), "one float32 channel"));
 }
 
-struct Size {
-    int width, height;
-};
 // From 120 x 90: by whole factors, by others, growing, and not at all.
 constexpr Size kSizes[] = {{60, 45},   {30, 22},   {80, 60}, {77, 58},
                            {240, 180}, {149, 112}, {120, 90}};

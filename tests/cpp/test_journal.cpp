@@ -170,7 +170,7 @@ TEST(Journal, TakesUnitsFromManyThreads) {
                     journal.append({{std::to_string(100 * t + i), i}}, {"a"});
             });
         for (std::thread& thread : threads) thread.join();
-        EXPECT_EQ(journal.units().size(), 200u);
+        EXPECT_TRUE(journal.units().empty());  // memory does not grow with what is noted
     }
     EXPECT_EQ(Journal(scratch / "j", kMade).units().size(), 200u);
 }

@@ -10,7 +10,7 @@ namespace {
 using testing::has;
 using testing::refusal;
 
-constexpr int kFrames = 18, kWidth = 160, kHeight = 120;
+constexpr int kFrames = 18, kLateWidth = 160, kLateHeight = 120;
 
 // A rig before a scene that moves by `steps` from frame to frame, sources a little noisy.
 struct Drive {
@@ -19,23 +19,23 @@ struct Drive {
 
     Drive(unsigned seed, const std::function<Eigen::Vector2d(int)>& place, bool mirrored = false) {
         std::mt19937 random(seed);
-        truth = testing::random_rig(random, kWidth, kHeight, kWidth, kHeight);
-        const testing::Field scene = testing::blobs(random, kWidth, kHeight, 60, 3, 1.3);
-        const testing::Field depth = testing::rolling_depth(kWidth, kHeight);
+        truth = testing::random_rig(random, kLateWidth, kLateHeight, kLateWidth, kLateHeight);
+        const testing::Field scene = testing::blobs(random, kLateWidth, kLateHeight, 60, 3, 1.3);
+        const testing::Field depth = testing::rolling_depth(kLateWidth, kLateHeight);
         for (int i = 0; i < kFrames; ++i) {
             const Eigen::Vector2d at = place(i);
             const testing::Field now = [&](double x, double y) {
                 return scene(x - at.x(), y - at.y());
             };
-            references.push_back(testing::drawn(now, kWidth, kHeight));
+            references.push_back(testing::drawn(now, kLateWidth, kLateHeight));
             sources.push_back(testing::source_view(
                 truth, [&](double x, double y) { return 1 - now(x, y); }, depth));
             for (float& value : sources.back().pixels)
                 value += static_cast<float>(testing::uniform(random, -0.01, 0.01));
             if (mirrored)
-                for (int y = 0; y < kHeight; ++y)
-                    std::reverse(sources.back().row(y), sources.back().row(y) + kWidth);
-            depths.push_back(testing::drawn(depth, kWidth, kHeight));
+                for (int y = 0; y < kLateHeight; ++y)
+                    std::reverse(sources.back().row(y), sources.back().row(y) + kLateWidth);
+            depths.push_back(testing::drawn(depth, kLateWidth, kLateHeight));
         }
         if (mirrored) truth = with_flipped_source(truth);
     }

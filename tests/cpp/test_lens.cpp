@@ -8,17 +8,17 @@
 #include "geometry/projector.hpp"
 #include "refusal.hpp"
 #include "scenes.hpp"
+#include "views.hpp"
 #include "xcalib/lens.hpp"
 
 namespace xcalib {
 namespace {
 
+using ::xcalib::testing::kInfinity;
 using ::xcalib::testing::random_bent_rig;
 using ::xcalib::testing::random_lens;
 using ::xcalib::testing::refusal;
 using ::xcalib::testing::uniform;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Lens, BrownShowsAPointWhereItIsWorkedOutByHand) {
     // r2 = 1/4 + 1/4 = 1/2; f = 1 - 0.2/2 + 0.1/4 = 0.925.

@@ -14,15 +14,15 @@ using namespace ::xcalib::testing;  // NOLINT: scenes.hpp
 
 // One pair seen by a rig whose edges vanish towards the border, so that masks do not matter, and
 // the rig at which it is looked at: some pixels off.
-struct Scene {
+struct EdgeScene {
     Rig truth, rig;
     Image reference, source, depth;
     NecFrame frame;
 };
 
-Scene smooth_scene(unsigned seed, int width = 200, int height = 150) {
+EdgeScene smooth_scene(unsigned seed, int width = 200, int height = 150) {
     std::mt19937 random(seed);
-    Scene scene;
+    EdgeScene scene;
     const int source_width = width * 9 / 10, source_height = height * 9 / 10;
     scene.truth = random_rig(random, width, height, source_width, source_height);
     scene.truth.source.fx = scene.truth.source.fy = 0.85 * scene.truth.reference.fx;
@@ -106,7 +106,7 @@ TEST(MeanGradient, OfTheWarpedSourceIsOverPixelsWhoseStencilIsValid) {
 
 TEST(Nec, HalfTheSumOfSquaresIsOneMinusNec) {
     for (unsigned seed = 1; seed <= 4; ++seed) {
-        const Scene scene = smooth_scene(seed);
+        const EdgeScene scene = smooth_scene(seed);
         const NecRows rows = nec_rows(scene.frame, scene.rig, Parameters(kNumParameters));
         const double nec = evaluate_nec(scene.frame, scene.rig).nec;
         EXPECT_GT(nec, 0.3);
@@ -118,7 +118,7 @@ TEST(Nec, HalfTheSumOfSquaresIsOneMinusNec) {
 TEST(Nec, NormalEquationsAreThoseOfTheRows) {
     for (const int count : {int{kNumWithoutReference}, int{kNumParameters}})
         for (unsigned seed = 1; seed <= 4; ++seed) {
-            const Scene scene = smooth_scene(seed, 80, 60);
+            const EdgeScene scene = smooth_scene(seed, 80, 60);
             const NecRows rows = nec_rows(scene.frame, scene.rig, Parameters(count));
             const NecNormalEquations equations =
                 nec_normal_equations(scene.frame, scene.rig, Parameters(count));
@@ -134,7 +134,7 @@ TEST(Nec, NormalEquationsAreThoseOfTheRows) {
 }
 
 TEST(Nec, TheReferencesParametersComeAfterTheOthersAndChangeNothingThere) {
-    const Scene scene = smooth_scene(5, 80, 60);
+    const EdgeScene scene = smooth_scene(5, 80, 60);
     const auto some =
         nec_normal_equations(scene.frame, scene.rig, Parameters(kNumWithoutReference));
     const auto all = nec_normal_equations(scene.frame, scene.rig, Parameters(kNumParameters));
@@ -185,7 +185,7 @@ TEST(Nec, GradientAgreesWithCentralDifferencesPerParameterClass) {
 // Edges that come up through the floor, reach the cap or change polarity are kinks of the cost.
 TEST(Nec, GradientHoldsOnAverageWhereEdgesComeAndGo) {
     for (unsigned seed = 1; seed <= 3; ++seed) {
-        const Scene scene = smooth_scene(seed);
+        const EdgeScene scene = smooth_scene(seed);
         const Eigen::Vector3d direction(0.5, -0.7, 0.3);
         const double reach = 0.02;  // [rad], some pixels
         const auto rig_at = [&](double s) { return turned(scene.rig, s * direction); };
@@ -207,7 +207,7 @@ TEST(Nec, GradientHoldsOnAverageWhereEdgesComeAndGo) {
 
 TEST(Nec, TheCheapValueIsTheFullOne) {
     for (unsigned seed = 1; seed <= 4; ++seed) {
-        const Scene scene = smooth_scene(seed, 80, 60);
+        const EdgeScene scene = smooth_scene(seed, 80, 60);
         const NecValue cheap = evaluate_nec(scene.frame, scene.rig);
         const NecValue full =
             nec_normal_equations(scene.frame, scene.rig, Parameters(kNumWithoutReference)).value;
@@ -219,7 +219,7 @@ TEST(Nec, TheCheapValueIsTheFullOne) {
 }
 
 TEST(Nec, ReversedContrastOfTheSourceChangesNothing) {
-    const Scene scene = smooth_scene(6, 80, 60);
+    const EdgeScene scene = smooth_scene(6, 80, 60);
     Image reversed = scene.source;
     for (float& value : reversed.pixels) value = 1 - value;
     const NecFrame frame = make_nec_frame(scene.reference, reversed, scene.depth, scene.rig);
@@ -252,7 +252,7 @@ TEST(Nec, IsOneWhereTheRigExplainsTheSourceAndLessWhereItDoesNot) {
 }
 
 TEST(Nec, PixelsOfUnknownDepthAndTheirStencilsDoNotCount) {
-    Scene scene = smooth_scene(8, 120, 90);
+    EdgeScene scene = smooth_scene(8, 120, 90);
     // A hole in the depth, and a source that differs only where the hole's pixels look.
     const int x0 = 45, x1 = 75, y0 = 30, y1 = 60;
     for (int y = y0; y < y1; ++y)
@@ -281,7 +281,7 @@ TEST(Nec, PixelsOfUnknownDepthAndTheirStencilsDoNotCount) {
 }
 
 TEST(Nec, TheReferencesEdgesBesideAHoleInTheDepthDoNotCount) {
-    Scene scene = smooth_scene(9, 120, 90);
+    EdgeScene scene = smooth_scene(9, 120, 90);
     scene.depth.row(45)[60] = 0.0f;
     const NecFrame one = make_nec_frame(scene.reference, scene.source, scene.depth, scene.rig);
     NecFrame other = one;
@@ -307,7 +307,7 @@ TEST(Nec, TheRimOfTheWarpIsNotAnEdge) {
 }
 
 TEST(Nec, ValidShareIsTheCoveredEdgeEnergy) {
-    const Scene scene = smooth_scene(11, 120, 90);
+    const EdgeScene scene = smooth_scene(11, 120, 90);
     EXPECT_NEAR(evaluate_nec(scene.frame, scene.rig).valid_share, 1, 0.02);
     // Half of the depth unknown: what is left is all there is to cover.
     Image half = scene.depth;
@@ -318,7 +318,7 @@ TEST(Nec, ValidShareIsTheCoveredEdgeEnergy) {
 }
 
 TEST(Nec, WithoutOverlapItIsZeroAndSoAreTheEquations) {
-    const Scene scene = smooth_scene(12, 80, 60);
+    const EdgeScene scene = smooth_scene(12, 80, 60);
     const Rig away = turned(scene.rig, {0, 2.5, 0});
     const auto equations = nec_normal_equations(scene.frame, away, Parameters(kNumParameters));
     EXPECT_EQ(equations.value.nec, 0);

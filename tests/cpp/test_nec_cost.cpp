@@ -107,15 +107,15 @@ TEST(Compress, KeepsTheEquationsOfARealPair) {
 
 constexpr int kBlockSizes[] = {2, 2, 1, 4, 3, 2, 2, 1, 2};
 
-struct Scene {
+struct CostScene {
     Rig truth, rig;
     NecFrame frame;
 };
 
 // `off`: how far the rig is from the truth, 1 for a few pixels.
-Scene smooth_scene(unsigned seed, double off, int width = 300, int height = 225) {
+CostScene cost_scene(unsigned seed, double off, int width = 300, int height = 225) {
     std::mt19937 random(seed);
-    Scene scene;
+    CostScene scene;
     scene.truth = random_rig(random, width, height, width, height);
     scene.truth.source.fx = scene.truth.source.fy = 0.9 * scene.truth.reference.fx;
     const Field texture = blobs(random, width, height, 14, 0.06 * width, 0.5);
@@ -209,7 +209,7 @@ TEST(NecCost, GradientThroughTheManifoldAgreesWithCentralDifferences) {
 }
 
 TEST(NecCost, GradientIsThatOfTheNormalEquationsTimesTheWeight) {
-    const Scene scene = smooth_scene(1, 1, 80, 60);
+    const CostScene scene = cost_scene(1, 1, 80, 60);
     const std::vector<double> found = OnePair(scene.frame, scene.rig, 0.3, true).gradient();
     Eigen::VectorXd expected =
         0.3 * nec_normal_equations(scene.frame, scene.rig, Parameters(kNumParameters)).gradient;
@@ -220,7 +220,7 @@ TEST(NecCost, GradientIsThatOfTheNormalEquationsTimesTheWeight) {
 }
 
 TEST(NecCost, TheCostIsTheWeightTimesOneMinusNec) {
-    const Scene scene = smooth_scene(4, 1);
+    const CostScene scene = cost_scene(4, 1);
     OnePair pair(scene.frame, scene.rig, 0.3, false);
     EXPECT_NEAR(pair.cost(), 0.3 * (1 - evaluate_nec(scene.frame, scene.rig).nec), 1e-9);
 }
@@ -228,7 +228,7 @@ TEST(NecCost, TheCostIsTheWeightTimesOneMinusNec) {
 TEST(NecCost, TheCostWithDerivativesIsTheCostWithout) {
     // Far from the optimum, and so near to it that the rows hold little but what the step removes.
     for (const double off : {2.0, 1.0, 0.3, 0.1, 0.03}) {
-        const Scene scene = smooth_scene(5, off, 120, 90);
+        const CostScene scene = cost_scene(5, off, 120, 90);
         OnePair pair(scene.frame, scene.rig, 0.3, false);
         double with = 0;
         std::vector<double> gradient;
@@ -239,8 +239,8 @@ TEST(NecCost, TheCostWithDerivativesIsTheCostWithout) {
     }
 }
 
-TEST(NecCost, APairThatLosesItsOverlapIsChargedForIt) {
-    const Scene scene = smooth_scene(6, 1);
+TEST(NecCost, APairThatLosesItsOverlapIsPenalised) {
+    const CostScene scene = cost_scene(6, 1);
     const Rig away = turned(scene.rig, {0, 0.45, 0});
     const double share = evaluate_nec(scene.frame, away).valid_share;
     const NecPair images(scene.frame);
@@ -263,7 +263,7 @@ TEST(NecCost, APairThatLosesItsOverlapIsChargedForIt) {
 }
 
 TEST(NecCost, BlocksThatAreNotAskedForMayBeLeftOut) {
-    const Scene scene = smooth_scene(7, 1, 80, 60);
+    const CostScene scene = cost_scene(7, 1, 80, 60);
     const NecPair images(scene.frame);
     const NecCost cost(images, scene.rig, 1.0, 0.0, Parameters(kNumParameters));
     SolverParameters p = solver_from_rig(scene.rig);

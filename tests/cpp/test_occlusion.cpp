@@ -15,7 +15,7 @@ namespace {
 
 using namespace ::xcalib::testing;  // NOLINT: scenes.hpp, refusal.hpp
 
-constexpr int kWidth = 640, kHeight = 480;
+constexpr int kStreetWidth = 640, kStreetHeight = 480;
 constexpr std::uint8_t kOccluded = static_cast<std::uint8_t>(Validity::occluded);
 
 // Upright boards, within the reference's view, and a wall that is not square to it: planes
@@ -39,15 +39,15 @@ double meets(const Board& b, const Eigen::Vector3d& origin, const Eigen::Vector3
 }
 
 struct Rendered {
-    Image depth{kWidth, kHeight};
+    Image depth{kStreetWidth, kStreetHeight};
     std::vector<bool> hidden;  // from the source camera
 };
 
 Rendered rendered(const Rig& rig) {
     Rendered out;
     const Eigen::Vector3d eye = -rig.R().transpose() * rig.t();
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < kStreetHeight; ++y)
+        for (int x = 0; x < kStreetWidth; ++x) {
             const Eigen::Vector3d ray = unproject(rig.reference, x, y, 1);
             double nearest = 1e9;
             for (const Board& board : kScene) {
@@ -66,23 +66,24 @@ Rendered rendered(const Rig& rig) {
 }
 
 struct Registered {
-    std::vector<float> image = std::vector<float>(kWidth * kHeight);
-    std::vector<std::uint8_t> mask = std::vector<std::uint8_t>(kWidth * kHeight);
+    std::vector<float> image = std::vector<float>(kStreetWidth * kStreetHeight);
+    std::vector<std::uint8_t> mask = std::vector<std::uint8_t>(kStreetWidth * kStreetHeight);
 };
 
 Registered registered(const Rig& rig, const Image& source, const Image& depth,
                       const RegistrarOptions& options) {
     Registered out;
     Registrar(rig, options)
-        .register_frame(source.view(), depth.view(),
-                        {out.image.data(), kWidth, kHeight, 1, PixelType::f32, 4 * kWidth},
-                        out.mask.data());
+        .register_frame(
+            source.view(), depth.view(),
+            {out.image.data(), kStreetWidth, kStreetHeight, 1, PixelType::f32, 4 * kStreetWidth},
+            out.mask.data());
     return out;
 }
 
 Rig rig_at(const Eigen::Vector3d& source_position, int source_width, int source_height,
            double hfov) {
-    Rig rig{Pinhole::from_hfov(kWidth, kHeight, 0.9),
+    Rig rig{Pinhole::from_hfov(kStreetWidth, kStreetHeight, 0.9),
             Pinhole::from_hfov(source_width, source_height, hfov),
             {}};
     rig = turned(rig, {0.01, -0.02, 0.015});
@@ -129,7 +130,7 @@ TEST(Occlusion, IsWhatTheRaysSay) {
         const Registered found =
             registered(rig, source, scene.depth, {1, false, Occlusion::hide, 0});
         int hidden = 0, visible = 0, hits = 0, lost = 0;
-        for (int i = 0; i < kWidth * kHeight; ++i) {
+        for (int i = 0; i < kStreetWidth * kStreetHeight; ++i) {
             if (all.mask[i] != 0) {
                 ASSERT_EQ(found.mask[i], all.mask[i]);
                 continue;
@@ -156,7 +157,8 @@ TEST(Occlusion, MarkedPixelsKeepWhatTheSourceShowsThere) {
     const auto with = [&](Occlusion occlusion, bool nearest) {
         return registered(rig, source, scene.depth, {2, nearest, occlusion, 0});
     };
-    std::vector<float> marked_map(2 * kWidth * kHeight), map = marked_map, hidden_map = map;
+    std::vector<float> marked_map(2 * kStreetWidth * kStreetHeight), map = marked_map,
+                                                                     hidden_map = map;
     Registrar(rig, {2, false, Occlusion::ignore, 0}).map(scene.depth.view(), map.data());
     Registrar(rig, {2, false, Occlusion::mark, 0}).map(scene.depth.view(), marked_map.data());
     Registrar(rig, {2, false, Occlusion::hide, 0}).map(scene.depth.view(), hidden_map.data());
@@ -165,7 +167,7 @@ TEST(Occlusion, MarkedPixelsKeepWhatTheSourceShowsThere) {
         const Registered marked = with(Occlusion::mark, nearest);
         const Registered hidden = with(Occlusion::hide, nearest);
         int count = 0;
-        for (int i = 0; i < kWidth * kHeight; ++i) {
+        for (int i = 0; i < kStreetWidth * kStreetHeight; ++i) {
             ASSERT_EQ(marked.mask[i], hidden.mask[i]);
             ASSERT_EQ(marked.image[i], all.image[i]);
             const bool gone = marked.mask[i] == kOccluded;
@@ -185,9 +187,9 @@ TEST(Occlusion, NothingHidesOnOneSurface) {
                                             Eigen::Vector3d(0.2, 0.2, 0.3)}) {
         const Rig rig = rig_at(position, 320, 256, 0.9);
         // A road up to the horizon: depth grows by far more than any tolerance from row to row.
-        Image road(kWidth, kHeight);
-        for (int y = 0; y < kHeight; ++y)
-            for (int x = 0; x < kWidth; ++x)
+        Image road(kStreetWidth, kStreetHeight);
+        for (int y = 0; y < kStreetHeight; ++y)
+            for (int x = 0; x < kStreetWidth; ++x)
                 road.row(y)[x] = y > 250 ? static_cast<float>(1.5 * 600 / (y - 249)) : 0.0f;
         const Registered out =
             registered(rig, Image(320, 256, 1.0f), road, {1, false, Occlusion::hide, 0});
@@ -220,7 +222,7 @@ void expect_the_same_on_every_path(const Rig& rig) {
         // How many pixels are looked at together depends on the vector's length.
         int differ = 0;
         for (std::size_t i = 0; i < out.mask.size(); ++i) differ += out.mask[i] != expected.mask[i];
-        EXPECT_LT(differ, kWidth * kHeight / 500);
+        EXPECT_LT(differ, kStreetWidth * kStreetHeight / 500);
     });
 }
 
@@ -302,9 +304,9 @@ TEST(Occlusion, TheMapHasNoPlaceForWhatIsHidden) {
     const Rendered scene = rendered(rig);
     const Registered out =
         registered(rig, Image(320, 256, 1.0f), scene.depth, {1, false, Occlusion::hide, 0});
-    std::vector<float> map(2 * kWidth * kHeight);
+    std::vector<float> map(2 * kStreetWidth * kStreetHeight);
     Registrar(rig, {2, false, Occlusion::hide, 0}).map(scene.depth.view(), map.data());
-    for (int i = 0; i < kWidth * kHeight; ++i)
+    for (int i = 0; i < kStreetWidth * kStreetHeight; ++i)
         ASSERT_EQ(std::isnan(map[2 * i]), out.mask[i] != 0) << i;
 }
 

@@ -19,7 +19,7 @@ Picture letters(int channels) {
     return picture;
 }
 
-std::string text_of(const Picture& picture) {
+std::string letters_of(const Picture& picture) {
     std::string text;
     for (int y = 0; y < picture.view.height; ++y) {
         text += y ? " " : "";
@@ -34,7 +34,8 @@ TEST(Oriented, EveryOrientationOfExif) {
                                     "ad be cf", "da eb fc", "fc eb da", "cf be ad"};
     for (const int channels : {1, 3})
         for (int orientation = 1; orientation <= 8; ++orientation)
-            EXPECT_EQ(text_of(oriented(letters(channels), orientation)), expected[orientation - 1])
+            EXPECT_EQ(letters_of(oriented(letters(channels), orientation)),
+                      expected[orientation - 1])
                 << orientation;
 }
 

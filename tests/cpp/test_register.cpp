@@ -7,14 +7,13 @@
 
 #include "refusal.hpp"
 #include "scenes.hpp"
+#include "views.hpp"
 #include "xcalib/register.hpp"
 
 namespace xcalib {
 namespace {
 
 using namespace ::xcalib::testing;  // NOLINT: scenes.hpp, refusal.hpp
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 template <class T>
 struct Pixels {
@@ -59,11 +58,11 @@ Pixels<T> random_pixels(std::mt19937& random, int width, int height, int channel
 RegistrarOptions by(int num_threads) { return {num_threads, false, Occlusion::ignore, 0}; }
 RegistrarOptions nearest_by(int num_threads) { return {num_threads, true, Occlusion::ignore, 0}; }
 
-constexpr int kWidth = 60, kHeight = 44, kSourceWidth = 50, kSourceHeight = 40;
+constexpr int kFrameWidth = 60, kFrameHeight = 44, kOtherWidth = 50, kOtherHeight = 40;
 
 Rig small_rig(unsigned seed) {
     std::mt19937 random(seed);
-    Rig rig = turned(random_rig(random, kWidth, kHeight, kSourceWidth, kSourceHeight),
+    Rig rig = turned(random_rig(random, kFrameWidth, kFrameHeight, kOtherWidth, kOtherHeight),
                      {0.02, 0.15, 0.05});
     rig.source_from_reference.translation.x() = 0.4;
     return rig;
@@ -71,7 +70,7 @@ Rig small_rig(unsigned seed) {
 
 Image some_depth(unsigned seed) {
     std::mt19937 random(seed);
-    Image depth(kWidth, kHeight);
+    Image depth(kFrameWidth, kFrameHeight);
     for (float& d : depth.pixels) d = static_cast<float>(uniform(random, 1.5, 20));
     depth.row(20)[30] = 0.0f;
     depth.row(20)[31] = kNaN;
@@ -87,23 +86,23 @@ void expect_registered_as_by_the_book(int channels) {
     const Image depth = some_depth(2);
     std::mt19937 random(3);
     const Pixels<T> source =
-        random_pixels<T>(random, kSourceWidth, kSourceHeight, channels, /*padding=*/5);
-    Pixels<T> out(kWidth, kHeight, channels, /*padding=*/3);
+        random_pixels<T>(random, kOtherWidth, kOtherHeight, channels, /*padding=*/5);
+    Pixels<T> out(kFrameWidth, kFrameHeight, channels, /*padding=*/3);
     std::fill(out.values.begin(), out.values.end(), T(77));
-    std::vector<std::uint8_t> mask(kWidth * kHeight, 9);
+    std::vector<std::uint8_t> mask(kFrameWidth * kFrameHeight, 9);
     Registrar(rig, by(2))
         .register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
     int valid = 0, outside = 0;
-    for (int y = 0; y < kHeight; ++y) {
-        for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < kFrameHeight; ++y) {
+        for (int x = 0; x < kFrameWidth; ++x) {
             const double z = depth.row(y)[x];
-            const int code = mask[y * kWidth + x];
+            const int code = mask[y * kFrameWidth + x];
             if (!(z > 0) || std::isinf(z)) {
                 EXPECT_EQ(code, 3);
             } else {
                 const Eigen::Vector2d p = mapped(rig, x, y, z);
                 const double rim =
-                    std::min({p.x(), kSourceWidth - 1 - p.x(), p.y(), kSourceHeight - 1 - p.y()});
+                    std::min({p.x(), kOtherWidth - 1 - p.x(), p.y(), kOtherHeight - 1 - p.y()});
                 if (std::abs(rim) > 1e-4) {
                     EXPECT_EQ(code, rim > 0 ? 0 : 1);
                 }
@@ -115,8 +114,8 @@ void expect_registered_as_by_the_book(int channels) {
                     continue;
                 }
                 const Eigen::Vector2d p = mapped(rig, x, y, z);
-                const int u = std::min(static_cast<int>(p.x()), kSourceWidth - 2);
-                const int v = std::min(static_cast<int>(p.y()), kSourceHeight - 2);
+                const int u = std::min(static_cast<int>(p.x()), kOtherWidth - 2);
+                const int v = std::min(static_cast<int>(p.y()), kOtherHeight - 2);
                 const double a = p.x() - u, b = p.y() - v;
                 const double value =
                     (1 - b) * ((1 - a) * source.at(u, v, c) + a * source.at(u + 1, v, c)) +
@@ -130,11 +129,11 @@ void expect_registered_as_by_the_book(int channels) {
                 }
             }
         }
-        for (int k = kWidth * channels; k < out.row; ++k)
+        for (int k = kFrameWidth * channels; k < out.row; ++k)
             EXPECT_EQ(out.values[static_cast<std::size_t>(y) * out.row + k], T(77))
                 << "wrote into the gap after row " << y;
     }
-    EXPECT_GT(valid, kWidth * kHeight / 3);
+    EXPECT_GT(valid, kFrameWidth * kFrameHeight / 3);
     EXPECT_GT(outside, 50);
 }
 
@@ -196,19 +195,19 @@ void expect_nearest_pixels_as_they_are(int channels) {
     const Image depth = some_depth(14);
     std::mt19937 random(15);
     const Pixels<T> source =
-        random_pixels<T>(random, kSourceWidth, kSourceHeight, channels, /*padding=*/5);
-    Pixels<T> out(kWidth, kHeight, channels, /*padding=*/3);
-    std::vector<std::uint8_t> mask(kWidth * kHeight, 9), expected_mask(mask);
+        random_pixels<T>(random, kOtherWidth, kOtherHeight, channels, /*padding=*/5);
+    Pixels<T> out(kFrameWidth, kFrameHeight, channels, /*padding=*/3);
+    std::vector<std::uint8_t> mask(kFrameWidth * kFrameHeight, 9), expected_mask(mask);
     Registrar(rig, nearest_by(2))
         .register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
-    Pixels<T> blended(kWidth, kHeight, channels);
+    Pixels<T> blended(kFrameWidth, kFrameHeight, channels);
     Registrar(rig, by(2))
         .register_frame(source.view(), depth.view(), blended.mutable_view(), expected_mask.data());
     EXPECT_EQ(mask, expected_mask);
     int valid = 0;
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
-            if (mask[y * kWidth + x] != 0) {
+    for (int y = 0; y < kFrameHeight; ++y)
+        for (int x = 0; x < kFrameWidth; ++x) {
+            if (mask[y * kFrameWidth + x] != 0) {
                 for (int c = 0; c < channels; ++c) ASSERT_EQ(out.at(x, y, c), T(0));
                 continue;
             }
@@ -222,7 +221,7 @@ void expect_nearest_pixels_as_they_are(int channels) {
             for (int c = 0; c < channels; ++c)
                 ASSERT_EQ(out.at(x, y, c), source.at(u, v, c)) << x << ", " << y;
         }
-    EXPECT_GT(valid, kWidth * kHeight / 3);
+    EXPECT_GT(valid, kFrameWidth * kFrameHeight / 3);
 }
 
 TEST(Registrar, NearestKeepsThePixelsAsTheyAre) {
@@ -249,16 +248,17 @@ TEST(Registrar, NearestReachesTheLastPixel) {
 template <class T>
 void expect_identity_is_exact(int channels) {
     std::mt19937 random(4);
-    const Pixels<T> source = random_pixels<T>(random, kWidth, kHeight, channels);
-    Pixels<T> out(kWidth, kHeight, channels);
-    std::vector<std::uint8_t> mask(kWidth * kHeight, 9);
-    const Pinhole camera{kWidth, kHeight, 60.5, 61.25, 30.125, 21.75, 0.5};
-    const Image depth(kWidth, kHeight, 2.0f);  // a power of two: no rounding of the depth's own
+    const Pixels<T> source = random_pixels<T>(random, kFrameWidth, kFrameHeight, channels);
+    Pixels<T> out(kFrameWidth, kFrameHeight, channels);
+    std::vector<std::uint8_t> mask(kFrameWidth * kFrameHeight, 9);
+    const Pinhole camera{kFrameWidth, kFrameHeight, 60.5, 61.25, 30.125, 21.75, 0.5};
+    const Image depth(kFrameWidth, kFrameHeight,
+                      2.0f);  // a power of two: no rounding of the depth's own
     Registrar(Rig{camera, camera, {}})
         .register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
-            ASSERT_EQ(mask[y * kWidth + x], 0) << x << ", " << y;
+    for (int y = 0; y < kFrameHeight; ++y)
+        for (int x = 0; x < kFrameWidth; ++x) {
+            ASSERT_EQ(mask[y * kFrameWidth + x], 0) << x << ", " << y;
             for (int c = 0; c < channels; ++c) {
                 if constexpr (std::is_floating_point_v<T>) {
                     ASSERT_NEAR(out.at(x, y, c), source.at(x, y, c), 1e-4);
@@ -281,28 +281,28 @@ TEST(Registrar, IdentityReturnsTheImage) {
 // A pixel that is not finite reaches those that are made of it, and no others.
 void expect_not_finite_is_invalid(int channels, bool nearest, float value) {
     std::mt19937 random(8);
-    Pixels<float> source = random_pixels<float>(random, kWidth, kHeight, channels);
-    const Image depth(kWidth, kHeight, 2.0f);
+    Pixels<float> source = random_pixels<float>(random, kFrameWidth, kFrameHeight, channels);
+    const Image depth(kFrameWidth, kFrameHeight, 2.0f);
     RegistrarOptions options = by(2);
     options.nearest = nearest;
-    const Registrar registrar(shifted_rig(kWidth, kHeight, 0.25, 0.25), options);
+    const Registrar registrar(shifted_rig(kFrameWidth, kFrameHeight, 0.25, 0.25), options);
     const auto registered = [&](Pixels<float>& out, std::vector<std::uint8_t>& mask) {
         registrar.register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
     };
-    Pixels<float> before(kWidth, kHeight, channels), after = before;
-    std::vector<std::uint8_t> whole(kWidth * kHeight, 9), codes = whole;
+    Pixels<float> before(kFrameWidth, kFrameHeight, channels), after = before;
+    std::vector<std::uint8_t> whole(kFrameWidth * kFrameHeight, 9), codes = whole;
     registered(before, whole);
     const int hole_x = 17, hole_y = 11;
-    source.values[static_cast<std::size_t>((hole_y * kWidth + hole_x) * channels + channels - 1)] =
-        value;
+    source.values[static_cast<std::size_t>((hole_y * kFrameWidth + hole_x) * channels + channels -
+                                           1)] = value;
     registered(after, codes);
     int holes = 0;
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < kFrameHeight; ++y)
+        for (int x = 0; x < kFrameWidth; ++x) {
             const bool near =
                 nearest ? x == hole_x && y == hole_y
                         : (x == hole_x || x == hole_x - 1) && (y == hole_y || y == hole_y - 1);
-            const std::size_t at = static_cast<std::size_t>(y) * kWidth + x;
+            const std::size_t at = static_cast<std::size_t>(y) * kFrameWidth + x;
             holes += near;
             ASSERT_EQ(codes[at], near ? 1 : whole[at]) << x << ", " << y;
             for (int c = 0; c < channels; ++c)
@@ -323,12 +323,12 @@ TEST(Registrar, WhatIsNotFiniteInTheSourceIsOutside) {
 TEST(Registrar, MapIsWhereTheRigSendsEachPixel) {
     const Rig rig = small_rig(5);
     const Image depth = some_depth(6);
-    std::vector<float> map(2 * kWidth * kHeight, -7.0f);
+    std::vector<float> map(2 * kFrameWidth * kFrameHeight, -7.0f);
     Registrar(rig, by(2)).map(depth.view(), map.data());
     int valid = 0;
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
-            const float u = map[2 * (y * kWidth + x)], v = map[2 * (y * kWidth + x) + 1];
+    for (int y = 0; y < kFrameHeight; ++y)
+        for (int x = 0; x < kFrameWidth; ++x) {
+            const float u = map[2 * (y * kFrameWidth + x)], v = map[2 * (y * kFrameWidth + x) + 1];
             ASSERT_EQ(std::isnan(u), std::isnan(v));
             if (std::isnan(u)) continue;
             ++valid;
@@ -336,33 +336,33 @@ TEST(Registrar, MapIsWhereTheRigSendsEachPixel) {
             ASSERT_NEAR(u, p.x(), 1e-3);
             ASSERT_NEAR(v, p.y(), 1e-3);
         }
-    EXPECT_GT(valid, kWidth * kHeight / 3);
-    EXPECT_TRUE(std::isnan(map[2 * (20 * kWidth + 30)]));
+    EXPECT_GT(valid, kFrameWidth * kFrameHeight / 3);
+    EXPECT_TRUE(std::isnan(map[2 * (20 * kFrameWidth + 30)]));
 }
 
 TEST(Registrar, DepthMayHaveAnotherSize) {
     const Rig rig = small_rig(7);
     const auto plane = [](double x, double y) { return 1 / (0.2 + 2e-3 * x + 4e-3 * y); };
-    const Image full = drawn(plane, kWidth, kHeight);
+    const Image full = drawn(plane, kFrameWidth, kFrameHeight);
     const Image half = drawn([&](double x, double y) { return plane(2 * x + 0.5, 2 * y + 0.5); },
-                             kWidth / 2, kHeight / 2);
+                             kFrameWidth / 2, kFrameHeight / 2);
     const Image twice = drawn([&](double x, double y) { return plane(x / 2 - 0.25, y / 2 - 0.25); },
-                              2 * kWidth, 2 * kHeight);
+                              2 * kFrameWidth, 2 * kFrameHeight);
     const Registrar registrar(rig, by(0));
-    std::vector<float> expected(2 * kWidth * kHeight), found(expected.size());
+    std::vector<float> expected(2 * kFrameWidth * kFrameHeight), found(expected.size());
     registrar.map(full.view(), expected.data());
     for (const Image& depth : {half, twice}) {
         registrar.map(depth.view(), found.data());
         int valid = 0;
-        for (int y = 1; y < kHeight - 1; ++y)
-            for (int x = 1; x < kWidth - 1; ++x) {
-                const std::size_t i = 2 * (y * kWidth + x);
+        for (int y = 1; y < kFrameHeight - 1; ++y)
+            for (int x = 1; x < kFrameWidth - 1; ++x) {
+                const std::size_t i = 2 * (y * kFrameWidth + x);
                 if (std::isnan(expected[i]) || std::isnan(found[i])) continue;
                 ++valid;
                 ASSERT_NEAR(found[i], expected[i], 2e-3) << x << ", " << y;
                 ASSERT_NEAR(found[i + 1], expected[i + 1], 2e-3);
             }
-        EXPECT_GT(valid, kWidth * kHeight / 3);
+        EXPECT_GT(valid, kFrameWidth * kFrameHeight / 3);
     }
 }
 
@@ -370,14 +370,14 @@ TEST(Registrar, TheNumberOfThreadsHasNoSay) {
     const Rig rig = small_rig(8);
     const Image depth = some_depth(9);
     std::mt19937 random(10);
-    const Pixels<float> source = random_pixels<float>(random, kSourceWidth, kSourceHeight, 3);
+    const Pixels<float> source = random_pixels<float>(random, kOtherWidth, kOtherHeight, 3);
     std::vector<std::vector<float>> images, maps;
     std::vector<std::vector<std::uint8_t>> masks;
     for (const int threads : {1, 2, 3, 0}) {
         const Registrar registrar(rig, by(threads));
-        Pixels<float> out(kWidth, kHeight, 3);
-        std::vector<std::uint8_t> mask(kWidth * kHeight);
-        std::vector<float> map(2 * kWidth * kHeight);
+        Pixels<float> out(kFrameWidth, kFrameHeight, 3);
+        std::vector<std::uint8_t> mask(kFrameWidth * kFrameHeight);
+        std::vector<float> map(2 * kFrameWidth * kFrameHeight);
         registrar.register_frame(source.view(), depth.view(), out.mutable_view(), mask.data());
         registrar.map(depth.view(), map.data());
         for (float& value : map)
@@ -395,10 +395,11 @@ TEST(Registrar, TheNumberOfThreadsHasNoSay) {
 
 TEST(Registrar, WrongSizesAndTypesAreRefusedNamingBoth) {
     const Registrar registrar(small_rig(11));
-    Pixels<std::uint8_t> source(kSourceWidth, kSourceHeight, 1), out(kWidth, kHeight, 1);
-    Pixels<std::uint8_t> small(kSourceWidth - 1, kSourceHeight, 1), colour(kWidth, kHeight, 3);
-    const Image depth(kWidth, kHeight, 3.0f), square(kWidth, kWidth, 3.0f);
-    std::vector<std::uint8_t> mask(kWidth * kHeight);
+    Pixels<std::uint8_t> source(kOtherWidth, kOtherHeight, 1), out(kFrameWidth, kFrameHeight, 1);
+    Pixels<std::uint8_t> small(kOtherWidth - 1, kOtherHeight, 1),
+        colour(kFrameWidth, kFrameHeight, 3);
+    const Image depth(kFrameWidth, kFrameHeight, 3.0f), square(kFrameWidth, kFrameWidth, 3.0f);
+    std::vector<std::uint8_t> mask(kFrameWidth * kFrameHeight);
     const auto message = [&](const ImageView& s, const ImageView& d, const MutableImageView& o) {
         return refusal([&] { registrar.register_frame(s, d, o, mask.data()); });
     };

@@ -50,15 +50,15 @@ Image view_of(const Town& town, const Pinhole& camera, const Eigen::Matrix3d& to
     return image;
 }
 
-struct Scene {
+struct SearchedScene {
     Rig truth;  // a rotation, no baseline
     std::vector<Image> references, sources;
 };
 
-Scene make_scene(unsigned seed, double source_hfov_deg, const Eigen::Vector3d& turn_deg,
-                 int count = 3) {
+SearchedScene searched_scene(unsigned seed, double source_hfov_deg, const Eigen::Vector3d& turn_deg,
+                             int count = 3) {
     std::mt19937 random(seed);
-    Scene scene;
+    SearchedScene scene;
     scene.truth.reference = Pinhole::from_hfov(320, 240, 60 * kDegree);
     scene.truth.source = Pinhole::from_hfov(320, 256, source_hfov_deg * kDegree);
     scene.truth = turned(scene.truth, turn_deg * kDegree);
@@ -81,7 +81,7 @@ std::vector<EdgeMap> edge_maps(const std::vector<Image>& images) {
     return maps;
 }
 
-SearchSpace space_around(const Scene& scene) {
+SearchSpace space_around(const SearchedScene& scene) {
     SearchSpace space;
     SearchHypothesis hypothesis{scene.truth.reference, {}};
     for (int i = -15; i <= 15; ++i)
@@ -113,7 +113,7 @@ double distance(const Rig& a, const Rig& truth) {
 constexpr double kFewPixels = 8;
 
 TEST(Search, FindsTheSameFieldOfViewTurned) {
-    const Scene scene = make_scene(1, 60, {3, -5, 0});
+    const SearchedScene scene = searched_scene(1, 60, {3, -5, 0});
     const auto found = global_search(edge_maps(scene.references), edge_maps(scene.sources),
                                      space_around(scene), 2);
     ASSERT_FALSE(found.empty());
@@ -123,7 +123,7 @@ TEST(Search, FindsTheSameFieldOfViewTurned) {
 }
 
 TEST(Search, FindsANarrowerSourceOffTheAxis) {
-    const Scene scene = make_scene(2, 38, {-4, 8, 1});
+    const SearchedScene scene = searched_scene(2, 38, {-4, 8, 1});
     const auto found = global_search(edge_maps(scene.references), edge_maps(scene.sources),
                                      space_around(scene), 2);
     ASSERT_FALSE(found.empty());
@@ -132,7 +132,7 @@ TEST(Search, FindsANarrowerSourceOffTheAxis) {
 }
 
 TEST(Search, FindsAWiderSourceRolled) {
-    const Scene scene = make_scene(3, 85, {2, 6, -4});
+    const SearchedScene scene = searched_scene(3, 85, {2, 6, -4});
     const auto found = global_search(edge_maps(scene.references), edge_maps(scene.sources),
                                      space_around(scene), 2);
     ASSERT_FALSE(found.empty());
@@ -140,7 +140,7 @@ TEST(Search, FindsAWiderSourceRolled) {
 }
 
 TEST(Search, SearchesAroundTheRotationThatItIsGiven) {
-    const Scene scene = make_scene(4, 60, {5, 30, 0});
+    const SearchedScene scene = searched_scene(4, 60, {5, 30, 0});
     SearchSpace space = space_around(scene);
     space.base = turned({}, Eigen::Vector3d(5, 28, 0) * kDegree).R();
     space.max_shift = 0.15;
@@ -151,7 +151,7 @@ TEST(Search, SearchesAroundTheRotationThatItIsGiven) {
 }
 
 TEST(Search, StaysWithinTheShiftThatItIsGiven) {
-    const Scene scene = make_scene(5, 60, {0, 18, 0});
+    const SearchedScene scene = searched_scene(5, 60, {0, 18, 0});
     SearchSpace space = space_around(scene);
     space.max_shift = 0.1;  // 18 deg are about 0.3
     for (const SearchCandidate& candidate :
@@ -162,7 +162,7 @@ TEST(Search, StaysWithinTheShiftThatItIsGiven) {
 }
 
 TEST(Search, CandidatesComeBestFirstAreDistinctAndNoMoreThanAskedFor) {
-    const Scene scene = make_scene(6, 50, {2, 3, 0});
+    const SearchedScene scene = searched_scene(6, 50, {2, 3, 0});
     SearchSpace space = space_around(scene);
     for (const int most : {1, 5}) {
         space.options.candidates = most;
@@ -183,7 +183,7 @@ TEST(Search, CandidatesComeBestFirstAreDistinctAndNoMoreThanAskedFor) {
 }
 
 TEST(Search, TheNumberOfThreadsHasNoSay) {
-    const Scene scene = make_scene(7, 50, {2, 3, 2}, 2);
+    const SearchedScene scene = searched_scene(7, 50, {2, 3, 2}, 2);
     const SearchSpace space = space_around(scene);
     const auto one = global_search(edge_maps(scene.references), edge_maps(scene.sources), space, 1);
     ASSERT_FALSE(one.empty());

@@ -12,7 +12,7 @@ namespace {
 using namespace testing;
 using Files = std::map<std::string, std::string>;
 
-const MadeWith kMade = {{"command", "test"}};
+const MadeWith kMadeBySink = {{"command", "test"}};
 
 std::string key_of(int index) { return "0123456789abcd" + std::to_string(10 + index); }
 
@@ -31,7 +31,7 @@ Registered pictures(int value, bool overlay = false) {
 class SinkOfAnOutput : public ::testing::Test {
    protected:
     std::map<std::string, long> run(int count, int stop, bool finish = true) {
-        Journal journal(journal_of(out()), kMade);
+        Journal journal(journal_of(out()), kMadeBySink);
         const std::unique_ptr<Sink> sink = open_sink(out(), 25, &journal, codecs, 3);
         const std::vector<FrameName> names = frames(count);
         std::map<std::string, long> done = sink->begin(names);
@@ -128,7 +128,7 @@ TEST_F(VideoSinks, GoOnWhereTheyEnded) {
 
 TEST_F(VideoSinks, KilledLoseTheOpenPartAndNoMore) {
     {
-        Journal journal(journal_of(out()), kMade);
+        Journal journal(journal_of(out()), kMadeBySink);
         auto sink = open_sink(out(), 25, &journal, codecs, 3);
         const auto names = frames(8);
         sink->begin(names);
@@ -184,7 +184,7 @@ TEST_F(VideoSinks, RefuseAFolderOfPartsThatIsALink) {
 
 TEST_F(VideoSinks, OfOtherFramesKeepThePartsThatStillFollow) {
     run(8, 8, false);
-    Journal journal(journal_of(out()), kMade);
+    Journal journal(journal_of(out()), kMadeBySink);
     const auto sink = open_sink(out(), 25, &journal, codecs, 3);
     auto names = frames(8);
     names[4].key = "fedcba9876543210";  // its file has changed, and so the part of frames 3 to 5
@@ -204,7 +204,7 @@ TEST_F(VideoSinks, AreNotJoinedWhereFramesAreMissing) {
 
 TEST_F(VideoSinks, InterruptedWhileJoinedHaveAllTheirParts) {
     {
-        Journal journal(journal_of(out()), kMade);
+        Journal journal(journal_of(out()), kMadeBySink);
         const auto sink = open_sink(out(), 25, &journal, codecs, 3);
         const auto names = frames(8);
         sink->begin(names);

@@ -10,6 +10,7 @@
 #include "calibrate/plausible.hpp"
 #include "calibrate/static_edges.hpp"
 #include "calibrate/verdict.hpp"
+#include "views.hpp"
 #include "working_scene.hpp"
 #include "xcalib/verdict.hpp"
 
@@ -17,8 +18,6 @@ namespace xcalib {
 namespace {
 
 using namespace ::xcalib::testing;  // NOLINT: working_scene.hpp
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Halves, HaveEachFrameOnceAndNeighboursTogether) {
     EXPECT_EQ(halves_of(8)[0], (std::vector<std::size_t>{0, 1, 4, 5}));

@@ -7,6 +7,7 @@
 #include "every_target.hpp"
 #include "geometry/projector.hpp"
 #include "scenes.hpp"
+#include "views.hpp"
 #include "xcalib/warp.hpp"
 
 namespace xcalib {
@@ -14,8 +15,6 @@ namespace {
 
 using namespace ::xcalib::testing;  // NOLINT: scenes.hpp
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::uint8_t kValid = static_cast<std::uint8_t>(Validity::valid);
 constexpr std::uint8_t kOutside = static_cast<std::uint8_t>(Validity::outside);
 constexpr std::uint8_t kNoDepth = static_cast<std::uint8_t>(Validity::no_depth);

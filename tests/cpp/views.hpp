@@ -11,6 +11,10 @@ namespace xcalib::testing {
 inline constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
+struct Size {
+    int width, height;
+};
+
 template <class T>
 inline constexpr PixelType kType = PixelType::u8;
 template <>

@@ -1,6 +1,6 @@
 """Write the corpora that fuzzing begins with: `write_corpora.py FOLDER`, a folder a target.
 
-With the folder of bad inputs in PYTHONPATH: their rows are seeds.
+With the folders of tests and of bad inputs in PYTHONPATH: rows of their table are seeds.
 """
 
 import io
@@ -13,6 +13,24 @@ import journals
 import numbers_in_files
 import numpy as np
 from table import RIG, Row
+
+from flir import radiometric
+
+CALIBRATED = (
+    RIG.replace("version: 1", "version: 2")
+    + """calibration:
+  trusted: true
+  found: true
+  reason: two halves agree
+  expected_error_px: [0.1, 0.5]
+  error_by_depth:
+    - {depth_m: 2, error_px: [0.1, 0.5]}
+    - {depth_m: .inf, error_px: [0.1, .inf]}
+  frames: 8
+  date: 2026-01-01
+  software: xcalib 0.1.0
+"""
+)
 
 
 def seeds_of(rows: list[Row], suffix: str) -> list[bytes]:
@@ -33,6 +51,28 @@ def arrays() -> list[bytes]:
             np.save(file, np.ones((3, 4), dtype, order=order))
             seeds.append(file.getvalue())
     return seeds
+
+
+def archives() -> list[bytes]:
+    seeds = []
+    for save in (np.savez, np.savez_compressed):
+        for names in (["depth"], ["depth", "other"]):
+            file = io.BytesIO()
+            save(file, **dict.fromkeys(names, np.ones((3, 4), np.float32)))
+            seeds.append(file.getvalue())
+    pixels = np.ones((3, 4), np.float32).tobytes()
+    return [*seeds, b"Pf\n4 3\n-1\n" + pixels, b"Pf 4 3 1.0 " + pixels, b"PF\n1 1\n-1\n" + pixels]
+
+
+def images() -> list[bytes]:
+    image = np.ones((6, 8), np.uint8)
+    return [cv2.imencode(suffix, image)[1].tobytes() for suffix in (".png", ".jpg", ".tiff")]
+
+
+def radiometric_images() -> list[bytes]:
+    counts, colour = np.ones((6, 8), np.uint16), np.ones((6, 8, 3), np.uint8)
+    kinds = ((colour, "png"), (None, "png"), (colour, "plain"))
+    return [radiometric(counts, visible, raw) for visible, raw in kinds]
 
 
 def depth_maps() -> list[bytes]:
@@ -72,10 +112,13 @@ def main(folder: Path) -> None:
     rows = numbers_in_files.ROWS
     corpora = {
         "npy": arrays() + seeds_of(rows, ".npy"),
-        "rig_file": [RIG.encode(), *seeds_of(rows, ".yaml")],
+        "rig_file": [RIG.encode(), CALIBRATED.encode(), *seeds_of(rows, ".yaml")],
         "journal": seeds_of(journals.ROWS, ".jsonl"),
         "times_table": [b"# t\n0,1.5\n1;2.5\n", *seeds_of(rows, ".csv")],
         "depth_stream": depth_maps(),
+        "arrays": archives(),
+        "headers": images() + stacks(folder),
+        "flir": radiometric_images(),
         "tiff_stack": stacks(folder),
         "video": videos(folder),
     }

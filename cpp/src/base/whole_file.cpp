@@ -47,8 +47,11 @@ void write_all(int descriptor, std::string_view data, const Path& file) {
 // A descriptor that is closed at the end.
 class Opened {
    public:
-    Opened(const Path& file, int flags, const Path& named)
+    // `if_no_device`: what ENXIO means, where that is known.
+    Opened(const Path& file, int flags, const Path& named, const char* if_no_device = nullptr)
         : descriptor_(::open(file.c_str(), flags | O_CLOEXEC)) {
+        if (descriptor_ < 0 && errno == ENXIO && if_no_device)
+            throw InputError("cannot write to " + named.string() + ": " + if_no_device);
         if (descriptor_ < 0) fail(errno, named);
     }
     ~Opened() { ::close(descriptor_); }
@@ -170,7 +173,8 @@ void write_whole(const Path& named, std::string_view data) {
     const Destination to(named);
     if (to.direct) {
         // A pipe that nobody reads is an error at once, not a wait for ever.
-        const Opened out(to.file, O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY, named);
+        const Opened out(to.file, O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY, named,
+                         "nobody reads this pipe");
         if (fcntl(out, F_SETFL, O_APPEND) != 0) fail(errno, named);
         write_all(out, data, named);
         return;

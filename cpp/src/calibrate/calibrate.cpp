@@ -281,9 +281,11 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
 void CalibrationResult::distrust(const std::string& reason, const std::string& advice) {
     Verdict& verdict = report.verdict;
     const std::string line = reason + (advice.empty() ? "" : "; " + advice);
-    report.message = verdict.trusted ? line : report.message + "; " + line;
-    verdict.reason = verdict.trusted ? reason : verdict.line() + "; " + reason;
-    verdict.advice = advice;
+    // The footage explains what is wrong with the fit, so it comes first.
+    const std::string then = verdict.trusted ? "" : "besides: " + verdict.line();
+    report.message = verdict.trusted ? line : line + "; besides: " + report.message;
+    verdict.reason = reason;
+    verdict.advice = advice + (advice.empty() || then.empty() ? "" : "; ") + then;
     verdict.trusted = report.converged = converged = false;
     rig.verdict = std::make_shared<const Verdict>(verdict);
 }

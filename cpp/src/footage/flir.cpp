@@ -94,6 +94,12 @@ void take_raw(const Record& record, FlirParts& parts) {
     parts.big_endian = is_png || (!parts.is_file && record.big());
 }
 
+void take_visible(const Record& record, FlirParts& parts) {
+    parts.visible_width = static_cast<int>(record.number(2, 2));
+    parts.visible_height = static_cast<int>(record.number(4, 2));
+    parts.visible = record.rest(kPixels);
+}
+
 void take_camera(const Record& record, FlirParts& parts) {
     const Planck planck{record.real(0x58), record.real(0x5c), record.real(0x60),
                         record.whole(0x308, 4), record.real(0x30c)};
@@ -117,7 +123,7 @@ std::optional<FlirParts> flir_parts(std::string_view jpeg, const std::string& na
         const std::size_t at = file.number(entry + 12, 4), size = file.number(entry + 16, 4);
         if (size == 0) continue;
         if (type == kRaw) take_raw(file.inside(at, size), parts);
-        if (type == kEmbedded) parts.visible = file.inside(at, size).rest(kPixels);
+        if (type == kEmbedded) take_visible(file.inside(at, size), parts);
         if (type == kCamera && size >= 0x310) take_camera(file.inside(at, size), parts);
         if (type == kPicture && size >= 8) {
             const Record record(file.part(at, size), file.big(), name);
@@ -128,6 +134,29 @@ std::optional<FlirParts> flir_parts(std::string_view jpeg, const std::string& na
     }
     if (parts.thermal.empty()) return std::nullopt;
     return parts;
+}
+
+Rig flir_alignment(const FlirParts& parts, const std::string& name) {
+    const bool sized =
+        parts.width > 0 && parts.height > 0 && parts.visible_width > 0 && parts.visible_height > 0;
+    if (!sized || !(parts.real_to_ir > 0.1 && parts.real_to_ir < 10))
+        throw InputError(name +
+                         ": does not say how the camera lays its images over each other, expected"
+                         " a radiometric JPEG with Real2IR, or a rig file");
+    constexpr double kFieldOfView = 45 * 3.14159265358979323846 / 180;
+    Rig rig;
+    rig.reference = Pinhole::from_hfov(parts.visible_width, parts.visible_height, kFieldOfView);
+    // Thermal pixels of visible ones: the thermal image takes 1 / real_to_ir of the visible one's
+    // width, about its middle and the offset.
+    const double scale = parts.real_to_ir * parts.width / parts.visible_width;
+    const Eigen::Vector2d middle(0.5 * (parts.width - 1), 0.5 * (parts.height - 1));
+    const Eigen::Vector2d centre(0.5 * (parts.visible_width - 1) + parts.offset_x,
+                                 0.5 * (parts.visible_height - 1) + parts.offset_y);
+    Eigen::Matrix3d source_from_visible = Eigen::Vector3d(scale, scale, 1).asDiagonal();
+    source_from_visible.topRightCorner<2, 1>() = middle - scale * centre;
+    rig.source =
+        Pinhole::from_K(parts.width, parts.height, source_from_visible * rig.reference.K());
+    return rig;
 }
 
 void put_counts_right(FlirParts& parts) {

@@ -12,16 +12,23 @@ namespace {
 
 constexpr double kDegrees = 180 / 3.14159265358979323846;
 
+// With so many decimals, but no line of digits where a file has 1e299 in it.
+std::string number_text(const char* pattern, double value) {
+    return format(std::abs(value) < 1e7 ? pattern : "%g", value);
+}
+
 std::string vector_text(const Eigen::Vector3d& v) {
-    return format("%+.4f %+.4f %+.4f", v.x(), v.y(), v.z());
+    return number_text("%+.4f", v.x()) + " " + number_text("%+.4f", v.y()) + " " +
+           number_text("%+.4f", v.z());
 }
 
 std::string camera_text(const char* name, const Pinhole& c) {
-    return format(
-        "%-10s %dx%d px, fx %.2f fy %.2f px, HFoV %.2f VFoV %.2f deg, cx %.2f cy %.2f px,"
-        " skew %.3f px%s\n",
-        name, c.width, c.height, c.fx, c.fy, c.hfov() * kDegrees, c.vfov() * kDegrees, c.cx, c.cy,
-        c.skew, c.lens.bends() ? (", lens " + Lens::word(c.lens)).c_str() : "");
+    const auto px = [](double value) { return number_text("%.2f", value); };
+    return format("%-10s %dx%d px", name, c.width, c.height) + ", fx " + px(c.fx) + " fy " +
+           px(c.fy) +
+           format(" px, HFoV %.2f VFoV %.2f deg", c.hfov() * kDegrees, c.vfov() * kDegrees) +
+           ", cx " + px(c.cx) + " cy " + px(c.cy) + " px, skew " + number_text("%.3f", c.skew) +
+           " px" + (c.lens.bends() ? ", lens " + Lens::word(c.lens) : "") + "\n";
 }
 
 std::string error_text(const ExpectedError& error) {

@@ -48,7 +48,8 @@ class Section {
         for (const char* key : keys)
             if (!node[key])
                 reject(path, std::string("missing field '") + key + "' in " + name_ +
-                                 ", expected " + joined(keys));
+                                 ", expected " + joined(keys) +
+                                 (key == std::string("skew") ? "; write skew: 0 for none" : ""));
     }
 
     YAML::Node node(const char* key) const { return node_[key]; }

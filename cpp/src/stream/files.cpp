@@ -40,6 +40,13 @@ std::string readable(std::string text) {
     return text;
 }
 
+// Whether a name is an address (rtsp://..., also as a path has it, rtsp:/...) or an index of V4L2.
+bool is_camera(const std::string& name) {
+    const std::size_t letters = name.find_first_not_of("abcdefghijklmnopqrstuvwxyz");
+    return name.find_first_not_of("0123456789") == std::string::npos ||
+           (letters != std::string::npos && letters > 1 && name.compare(letters, 2, ":/") == 0);
+}
+
 }  // namespace
 
 std::string read_file(const fs::path& file, std::uintmax_t most) { return read_whole(file, most); }
@@ -53,7 +60,11 @@ std::vector<fs::path> list_files(const fs::path& folder, const std::vector<std::
     std::string kinds;
     for (const std::string& suffix : suffixes)
         kinds += (kinds.empty() ? "" : ", ") + suffix.substr(1);
-    if (!fs::exists(folder)) throw InputError(folder.string() + ": no such folder");
+    if (!fs::exists(folder))
+        throw InputError(folder.string() + ": no such folder" +
+                         (is_camera(folder.string())
+                              ? "; cameras are read by `xcalib-cli register --live`"
+                              : ""));
     if (!fs::is_directory(folder))
         throw InputError(folder.string() + " is a file, expected a folder of " + kinds + " files");
     std::vector<std::string> names;

@@ -150,7 +150,7 @@ void Journal::append(std::vector<std::pair<std::string, long>> frames,
     Unit unit{std::move(frames), {}};
     for (const std::string& name : files)
         unit.files.emplace_back(name, fs::file_size(path_.parent_path() / name));
-    append({std::move(unit)});
+    append(std::vector<Unit>{std::move(unit)});
 }
 
 void Journal::claim() {
@@ -166,7 +166,7 @@ void Journal::sync() const {
         throw std::system_error(errno, std::generic_category(), path_.string());
 }
 
-void Journal::append(std::vector<Unit> units) {
+void Journal::append(const std::vector<Unit>& units) {
     std::string lines;
     for (const Unit& unit : units) {
         Json line{{"frames", Json::object()}, {"files", Json::object()}};
@@ -179,7 +179,6 @@ void Journal::append(std::vector<Unit> units) {
     const std::lock_guard lock(mutex_);
     write(lines);
     sync();
-    std::move(units.begin(), units.end(), std::back_inserter(units_));
 }
 
 void Journal::open() {

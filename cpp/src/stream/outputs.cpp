@@ -39,12 +39,20 @@ bool is_called_like_a_file(const Path& output) {
 
 // Images and depth maps: what a folder may be given for.
 bool is_image(const Path& file) {
-    static const std::set<std::string> kSuffixes = {".png",  ".jpg", ".jpeg", ".tif",
-                                                    ".tiff", ".bmp", ".npy",  ".exr"};
+    static const std::set<std::string> kSuffixes = {".png", ".jpg", ".jpeg", ".tif",  ".tiff",
+                                                    ".bmp", ".pgm", ".ppm",  ".webp", ".jp2",
+                                                    ".npy", ".npz", ".pfm",  ".exr"};
     return kSuffixes.count(lower_suffix(file)) > 0;
 }
 
 Path folder_of(const Path& file) { return file.has_parent_path() ? file.parent_path() : "."; }
+
+// Of `-o=out` all behind the letter is the name.
+void check_no_equals(const std::string& name) {
+    if (name[0] == '=')
+        throw InputError("cannot write to " + name + ": expected -o " + name.substr(1) + " (./" +
+                         name + " is a name that begins with =)");
+}
 
 [[noreturn]] void refuse_folder(const Path& folder) {
     throw InputError("output folder " + folder.string() + " is an input folder, expected another");
@@ -53,6 +61,7 @@ Path folder_of(const Path& file) { return file.has_parent_path() ? file.parent_p
 }  // namespace
 
 void check_folder_writable(const Path& folder) {
+    check_no_equals(folder.string());
     if (folder.empty())
         throw InputError("cannot write to '': the name is empty, expected a folder name");
     Path base = fs::absolute(folder).lexically_normal();
@@ -70,6 +79,7 @@ void check_folder_writable(const Path& folder) {
 
 void check_file_writable(const Path& file) {
     check_name(file);
+    check_no_equals(file.string());
     const Destination to(file);
     if (fs::is_directory(to.file))
         throw InputError("cannot write to " + file.string() +

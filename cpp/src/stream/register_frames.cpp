@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
+#include <cstring>
 #include <map>
 
 #include "base/format.hpp"
@@ -27,18 +29,12 @@ std::string percentages(const BusyShares& busy) {
     return text;
 }
 
-// Frames a second, by the median; 25 where the stream does not say.
-double frame_rate(const Stream& stream) {
-    const double period = stream.times ? median_period(*stream.times) : 0.0;
-    return period > 0 ? 1 / period : 25.0;
-}
-
 const char* text_of(bool value) { return value ? "yes" : "no"; }
 
 // All that an output depends on, but for the frames and how fast it is made.
-MadeWith made_with(const Rig& rig, const std::filesystem::path& output,
-                   const RegistrationOptions& options, const std::string& command,
-                   const MadeWith& inputs, Codecs& codecs) {
+MadeWith made_with_of(const Rig& rig, const std::filesystem::path& output,
+                      const RegistrationOptions& options, const std::string& command,
+                      const MadeWith& inputs, Codecs& codecs) {
     MadeWith text = {{"command", command},
                      {"xcalib", XCALIB_VERSION},
                      {"rig", fingerprint(rig)},
@@ -62,6 +58,38 @@ std::vector<int> frames_needed(const Frames& frames, const std::vector<bool>& mi
     return needed;
 }
 
+// The rig at the size of the images, which the first frame that can be decoded tells.
+Rig fitted_to_images(const Rig& rig, const Frames& frames) {
+    for (int i = 0;; ++i) {
+        try {
+            const ImageView reference = (*frames.references)[i].view;
+            const ImageView source = (*frames.sources)[i].view;
+            return fitted(rig, reference.width, reference.height, source.width, source.height);
+        } catch (const DecodeError&) {
+            if (i + 1 == frames.size()) throw;
+        }
+    }
+}
+
+long not_finite_pixels(const ImageView& image) {
+    if (image.type != PixelType::f32) return 0;
+    constexpr std::uint32_t kExponent = 0x7f800000;  // all ones: infinite, or not a number
+    long count = 0;
+    for (int y = 0; y < image.height; ++y) {
+        const auto* row = image.row<float>(y);
+        for (int x = 0; x < image.width; ++x) {
+            bool found = false;
+            for (int c = 0; c < image.channels; ++c) {
+                std::uint32_t bits;
+                std::memcpy(&bits, &row[image.channels * x + c], sizeof bits);
+                found = found || (bits & kExponent) == kExponent;
+            }
+            count += found;
+        }
+    }
+    return count;
+}
+
 // A frame on its way; what no later stage needs is let go.
 struct Passing {
     Frame frame;
@@ -69,6 +97,11 @@ struct Passing {
 };
 
 }  // namespace
+
+double frame_rate(const Stream& references) {
+    const double period = references.times ? median_period(*references.times) : 0.0;
+    return period > 0 ? 1 / period : 25.0;
+}
 
 double Registration::speed() const { return made / std::max(seconds, 1e-9); }
 
@@ -83,6 +116,7 @@ std::string Registration::summary() const {
     std::string text = std::to_string(frames) + " frames";
     if (earlier) text += format(" (%d from before)", earlier);
     text += format(", %.1f %% valid", pixels ? 100.0 * valid / pixels : 0.0);
+    if (not_finite) text += format(", %ld source pixels are not finite, masked", not_finite);
     if (made) text += format(", %.1f frames/s", speed());
     if (made && !busy.empty()) text += " with files, busy: " + percentages(busy);
     return text;
@@ -136,14 +170,14 @@ std::vector<FrameName> frame_names(const Frames& frames) {
     return names;
 }
 
-Registration register_frames(const Frames& frames, const Rig& rig,
-                             const std::filesystem::path& output,
-                             const RegistrationOptions& options, const std::string& command,
-                             const MadeWith& inputs,
-                             const std::vector<std::filesystem::path>& other_reads, Codecs& codecs,
-                             const std::function<void(const Registration&)>& progress) {
+BegunRegistration::BegunRegistration(const Frames& frames, const Rig& rig,
+                                     const std::filesystem::path& output,
+                                     const RegistrationOptions& options, const std::string& command,
+                                     const MadeWith& inputs,
+                                     const std::vector<std::filesystem::path>& other_reads,
+                                     Codecs& codecs) {
     check_output_writable(output);
-    const std::vector<FrameName> names = frame_names(frames);
+    names = frame_names(frames);
     const std::vector<std::filesystem::path> files = output_files(output, names, options.overlays);
     std::vector<std::filesystem::path> reads = files_of(frames);
     reads.insert(reads.end(), other_reads.begin(), other_reads.end());
@@ -151,22 +185,34 @@ Registration register_frames(const Frames& frames, const Rig& rig,
     writes.files.push_back(journal_of(output));
     check_apart(reads, writes);
     check_alone(output);
-    const ImageView reference = (*frames.references)[0].view, source = (*frames.sources)[0].view;
-    const Rig sized = fitted(rig, reference.width, reference.height, source.width, source.height);
-    Journal journal(journal_of(output), made_with(rig, output, options, command, inputs, codecs),
-                    options.overwrite);
-    if (journal.is_new() && !options.overwrite) check_not_others(output, files);
-    const std::unique_ptr<Sink> sink =
-        open_sink(output, frame_rate(*frames.references), &journal, codecs, options.part_frames);
-    const std::map<std::string, long> there = sink->begin(names);
+    sized = fitted_to_images(rig, frames);
+    made_with = made_with_of(rig, output, options, command, inputs, codecs);
+    journal = std::make_unique<Journal>(journal_of(output), made_with, options.overwrite);
+    if (journal->is_new() && !options.overwrite) check_not_others(output, files);
+    const double rate = options.rate > 0 ? options.rate : frame_rate(*frames.references);
+    sink = open_sink(output, rate, journal.get(), codecs, options.part_frames);
+    there = sink->begin(names);
+}
+
+Registration register_frames(const Frames& frames, const Rig& rig,
+                             const std::filesystem::path& output,
+                             const RegistrationOptions& options, const std::string& command,
+                             const MadeWith& inputs,
+                             const std::vector<std::filesystem::path>& other_reads, Codecs& codecs,
+                             const std::function<void(const Registration&)>& progress) {
+    const BegunRegistration begun(frames, rig, output, options, command, inputs, other_reads,
+                                  codecs);
+    const std::vector<FrameName>& names = begun.names;
+    const Rig& sized = begun.sized;
+    Sink& sink = *begun.sink;
 
     Registration total;
     total.frames = frames.size();
     total.pixels = static_cast<long>(sized.reference.width) * sized.reference.height * total.frames;
     std::vector<bool> missing;
     for (const FrameName& frame : names) {
-        const auto found = there.find(frame.key);
-        missing.push_back(found == there.end());
+        const auto found = begun.there.find(frame.key);
+        missing.push_back(found == begun.there.end());
         if (missing.back()) continue;
         ++total.earlier;
         total.valid += found->second;
@@ -182,7 +228,7 @@ Registration register_frames(const Frames& frames, const Rig& rig,
 
     std::vector<Passing> passing(static_cast<std::size_t>(threads));
     std::atomic<int> made{0};  // by this run, as `valid` is of it
-    std::atomic<long> valid{0};
+    std::atomic<long> valid{0}, not_finite{0};
     const bool looks = options.overlays || frames.depth->looks_at_reference();
     // A stage by what it does with a frame on its way; `in_order` unless several may.
     const auto stage = [&](const char* name, bool concurrent, auto work) {
@@ -198,7 +244,9 @@ Registration register_frames(const Frames& frames, const Rig& rig,
               }),
         stage("decode", frames.sources->concurrent(),
               [&](Passing& p, int i) {
-                  if (missing[i]) p.frame.source = (*frames.sources)[i];
+                  if (!missing[i]) return;
+                  p.frame.source = (*frames.sources)[i];
+                  not_finite += not_finite_pixels(p.frame.source.view);
               }),
         stage("depth", frames.depth->concurrent(),
               [&](Passing& p, int i) { p.frame.depth = (*frames.depth)(i, p.frame.reference); }),
@@ -211,10 +259,10 @@ Registration register_frames(const Frames& frames, const Rig& rig,
                                             p.frame.depth, options.overlays);
                   p.frame = {};
               }),
-        stage("encode", sink->concurrent(), [&](Passing& p, int i) {
+        stage("encode", sink.concurrent(), [&](Passing& p, int i) {
             const Registered result = std::move(p.result);
             if (!missing[i]) return;
-            sink->write(i, names[i], result);
+            sink.write(i, names[i], result);
             ++made;
             valid += valid_pixels(result.mask.view);
         })};
@@ -224,6 +272,7 @@ Registration register_frames(const Frames& frames, const Rig& rig,
     const auto look = [&](const BusyShares& busy) {
         total.made = made;
         total.valid = valid_before + valid;
+        total.not_finite = not_finite;
         total.busy = busy;
         total.seconds =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -240,11 +289,11 @@ Registration register_frames(const Frames& frames, const Rig& rig,
                        check_interrupts();
                    });
     } catch (const Interrupted&) {
-        sink->keep();
+        sink.keep();
         check(format("%d of %d frames are done", total.earlier + made.load(), total.frames));
         throw;
     }
-    sink->finish(names, [&] { check("all frames are done, but not yet in one video"); });
+    sink.finish(names, [&] { check("all frames are done, but not yet in one video"); });
     look(total.busy);
     return total;
 }

@@ -53,6 +53,35 @@ std::string tiff_pixel_type(std::string_view data) {
     return kNames[format - 1] + std::to_string(bits);
 }
 
+bool put_as_signed(std::string& data) {
+    if (tiff_pixel_type(data) != "uint32") return false;
+    const bool big = data[0] == 'M';
+    const std::size_t page = Numbers(data, big)(4, 4), count = Numbers(data, big)(page, 2);
+    const std::size_t end = page + 2 + 12 * count;
+    if (data.size() < end + 4) return false;
+    const auto text_of = [big](std::uint32_t value, std::size_t size) {
+        std::string text(size, '\0');
+        for (std::size_t i = 0; i < size; ++i)
+            text[big ? size - 1 - i : i] = static_cast<char>(value >> (8 * i) & 0xff);
+        return text;
+    };
+    std::size_t at = page + 2;  // of the field, or of where it is to be: tags rise
+    while (at < end && Numbers(data, big)(at, 2) < kSampleFormat) at += 12;
+    if (at < end && Numbers(data, big)(at, 2) == kSampleFormat) {
+        if (Numbers(data, big)(at + 4, 4) != 1) return false;  // several channels
+        data.replace(at + 8, 2, text_of(2, 2));
+        return true;
+    }
+    // One that does not say it: the page's directory goes to the end of the file, with the field.
+    const std::string before = data.substr(page + 2, at - page - 2);
+    const std::string behind = data.substr(at, end + 4 - at);
+    if (data.size() % 2) data += '\0';
+    data.replace(4, 4, text_of(static_cast<std::uint32_t>(data.size()), 4));
+    data += text_of(static_cast<std::uint32_t>(count + 1), 2) + before + text_of(kSampleFormat, 2) +
+            text_of(kShort, 2) + text_of(1, 4) + text_of(2, 2) + text_of(0, 2) + behind;
+    return true;
+}
+
 void put_full_page_first(std::string& data, const std::string& name) {
     const std::string_view order = std::string_view(data).substr(0, 2);
     const bool big = order == "MM";

@@ -11,10 +11,11 @@ from typing import Any
 
 import click
 
-from .errors import ErrorsInOneLine, open_standard_streams
+from .errors import WRONG_INPUT, ErrorsInOneLine, open_standard_streams, stop
 from .options import ARGUMENTS
 
 COMMANDS = (
+    "batch",
     "calibrate",
     "convert",
     "demo",
@@ -40,7 +41,10 @@ class Commands(ErrorsInOneLine):
     ) -> click.Context:
         """With the arguments, for those who want to repeat the command."""
         given = list(args)
-        context = super().make_context(info_name, args, parent, **extra)
+        try:
+            context = super().make_context(info_name, args, parent, **extra)
+        except click.NoSuchOption as error:
+            stop(WRONG_INPUT, error.format_message())
         context.meta[ARGUMENTS] = given
         return context
 
@@ -57,6 +61,11 @@ class Commands(ErrorsInOneLine):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command that the arguments name, with those of its `--config` among them."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            *most, last = COMMANDS
+            raise click.UsageError(
+                f"No such command '{args[0]}', expected {', '.join(most)} or {last}"
+            )
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None and any(arg.startswith("--config") for arg in rest):
             rest = import_module(f"{__name__}.config").expanded(command, rest)

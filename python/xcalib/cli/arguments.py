@@ -35,18 +35,19 @@ WORDS = _option_words()
 SEED = click.IntRange(0, 2**32 - 1)
 COUNT = click.IntRange(1, 2**31 - 1)
 
+config_option = click.option(
+    "--config",
+    metavar="FILE",
+    expose_value=False,
+    help="Take arguments from a YAML file, by their names without dashes (reference, source,"
+    " depth, ...); those given here go before.",
+)
 frames_arguments = options(
-    click.argument("reference", type=Input()),
-    click.argument("source", type=Input()),
+    click.argument("reference", type=Input(urls=True)),
+    click.argument("source", type=Input(urls=True)),
     *DEPTH_OPTIONS,
     *FOOTAGE_OPTIONS,
-    click.option(
-        "--config",
-        metavar="FILE",
-        expose_value=False,
-        help="Take arguments from a YAML file, by their names without dashes (reference, source,"
-        " depth, ...); those given here go before.",
-    ),
+    config_option,
 )
 
 dry_run_option = click.option(
@@ -125,6 +126,7 @@ def inputs_of(arguments: Mapping[str, Any], threads: int) -> Inputs:
             threads,
         ),
         MeasuredDepth(**{field.name: a[field.name] for field in fields(MeasuredDepth)}),
+        (a["source_readout"] or 0.0, a["reference_readout"] or 0.0),
     )
 
 
@@ -166,13 +168,37 @@ def with_scalar_sources(frames: Frames, colormap: str) -> Frames:
     return frames
 
 
+def with_straight_rows(
+    frames: Frames,
+    arguments: Mapping[str, Any],
+    rig: Rig | None,
+    nearest: bool = False,
+    may_be_auto: bool = False,
+) -> Frames:
+    """The frames straightened by the readouts given; ``auto`` is none, where it may be given."""
+    source, reference = arguments["source_readout"], arguments["reference_readout"]
+    if not may_be_auto and None in (source, reference):
+        camera = "source" if source is None else "reference"
+        raise click.UsageError(
+            f"--{camera}-readout auto: expected the share that calibrate has found"
+        )
+    if source is None and reference is None:
+        raise click.UsageError(
+            "--source-readout auto --reference-readout auto: only how they differ can be seen;"
+            " expected a share for one of them"
+        )
+    return frames.with_straight_rows(source or 0, reference or 0, rig, nearest)
+
+
 def say_depth(frames: Frames) -> None:
     """What the numbers of the depth maps were taken for, once it is known that they will do."""
     if frames.depth_line:
         click.echo(frames.depth_line)
 
 
-def print_plan(frames: Frames, outputs: Sequence[Path | None], chosen: Sequence[int] = ()) -> None:
+def print_plan(
+    frames: Frames, outputs: Sequence[Path | str | None], chosen: Sequence[int] = ()
+) -> None:
     """What a run would read, pair, choose and write."""
     click.echo(plan_text(frames.references, frames.sources, frames.depth, list(chosen)))
     say_depth(frames)

@@ -23,7 +23,14 @@ from .._core import (
 from ..flow import FlowProvider, NetworkFlow
 from ..footage import lens_of_topic
 from ..frames import Image, InputError, check_file_writable, same_aspect, size_of, write_bytes
-from ..pipeline import Frames, choose_by_content, run_calibration, save_rig, with_fitted_plane
+from ..pipeline import (
+    Frames,
+    choose_by_content,
+    find_readout,
+    run_calibration,
+    save_rig,
+    with_fitted_plane,
+)
 from .arguments import (
     COUNT,
     DEFAULTS,
@@ -40,6 +47,7 @@ from .arguments import (
     say_depth,
     threads_option,
     with_scalar_sources,
+    with_straight_rows,
 )
 from .errors import NOT_TRUSTED, stop, warn
 from .options import ARGUMENTS, Input, Output
@@ -121,6 +129,7 @@ def frames_again(arguments: list[str], lag: int) -> Frames:
     initial = load_rig(options["initial"]) if options["initial"] else None
     frames = open_frames(options, options["threads"], initial)
     frames = with_scalar_sources(frames, options["source_colormap"])
+    frames = with_straight_rows(frames, options, initial, may_be_auto=True)
     return frames.with_lag(lag, [])[0] if lag else frames
 
 
@@ -370,7 +379,8 @@ def command(
     initial_rig = load_rig(initial) if initial else None
     frames = open_frames(inputs, threads, initial_rig)
     check_writes([output, report_file], frames, inputs, initial)
-    frames = with_scalar_sources(frames, source_colormap)
+    raw = with_scalar_sources(frames, source_colormap)
+    frames = with_straight_rows(raw, inputs, initial_rig, may_be_auto=True)
 
     arguments = list(click.get_current_context().meta.get(ARGUMENTS, ()))
     indices, looked_at, lag_taken = None, [], 0
@@ -397,6 +407,20 @@ def command(
     result, chosen = run_calibration(
         frames, calibration, initial_rig, quiet, set_cameras, indices, warn, flow
     )
+    readout = {name: inputs[f"{name}_readout"] for name in ("source", "reference")}
+    finds_readout = None in readout.values()
+    if finds_readout:
+        camera = "source" if readout["source"] is None else "reference"
+        fit = find_readout(raw, chosen, result.rig, calibration, readout, quiet)
+        click.echo(f"rolling shutter: {fit.line(camera)}")
+        readout[camera] = fit.taken if fit.seen else 0
+        arguments += [f"--{camera}-readout", f"{readout[camera]:g}"]
+    # Which rows of both look the same way is known now.
+    if any(readout.values()) and (finds_readout or (readout["reference"] and not initial_rig)):
+        frames = raw.with_straight_rows(readout["source"], readout["reference"], result.rig)
+        result, chosen = run_calibration(
+            frames, calibration, initial_rig, quiet, set_cameras, chosen, warn, flow
+        )
     if refine_plane:
         frames, plane = with_fitted_plane(frames, result.rig, chosen, calibration, quiet)
         result, chosen = run_calibration(

@@ -33,11 +33,11 @@ def expanded(command: click.Command, args: list[str]) -> list[str]:
     for key, param in options.items():
         if isinstance(param, click.Argument):
             if key in given:
-                words.append(_text(file, key, given[key]))
+                words.append(text_of(file, key, given[key]))
             elif typed_words:
                 words.append(typed_words.pop(0))
         elif key in given and not _is_typed(typed.get(param.name or "")):
-            flags += _flags(file, param, key, given[key])
+            flags += flags_of(file, param, key, given[key])
     if typed_words:
         raise InputError(
             f"{typed_words[0]}: one argument too many, beside those of --config {file}"
@@ -89,15 +89,17 @@ def _is_typed(value: Any) -> bool:
     return not (value is None or value is False or value == () or "UNSET" in repr(value).upper())
 
 
-def _flags(file: str, param: click.Parameter, key: str, value: Any) -> list[str]:
+def flags_of(file: str, param: click.Parameter, key: str, value: Any) -> list[str]:
+    """An option of a file as it would be typed."""
     if isinstance(param, click.Option) and param.is_flag:
         if not isinstance(value, bool):
             raise InputError(f"{file}: {key} is {value!r}, expected true or false")
         return [f"--{key}"] if value else []
-    return [f"--{key}={_text(file, key, value)}"]
+    return [f"--{key}={text_of(file, key, value)}"]
 
 
-def _text(file: str, key: str, value: Any) -> str:
+def text_of(file: str, key: str, value: Any) -> str:
+    """A value of a file as it would be typed."""
     if isinstance(value, list) and all(isinstance(item, (int, float, str)) for item in value):
         return ",".join(map(str, value))
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):

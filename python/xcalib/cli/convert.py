@@ -24,6 +24,9 @@ def size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple
     return int(width), int(height)
 
 
+WRITTEN = [name for name, kind in FORMATS.items() if kind.write or name == "xcalib"]
+
+
 @click.command("convert", short_help="Rigs from and to other tools' files; maps as flow.")
 @click.argument("files", metavar="FILE...", type=Input(), nargs=-1, required=True)
 @output_option("File to write, or folder, where the format has several.")
@@ -35,7 +38,7 @@ def size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple
 )
 @click.option(
     "--to",
-    type=click.Choice([*(f for f in FORMATS if f != "authors"), *MAPS]),
+    type=click.Choice([*WRITTEN, *MAPS]),
     default="xcalib",
     show_default=True,
     help="What to write: a rig, or its map for a depth (remap: .npy for cv2.remap; flo: .flo;"

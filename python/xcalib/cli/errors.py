@@ -51,7 +51,7 @@ class ErrorsInOneLine(click.Group):
         except (click.exceptions.Exit, click.exceptions.Abort):
             raise  # these are click's own control flow, and RuntimeErrors
         except click.ClickException as error:
-            stop(WRONG_INPUT, error.format_message())
+            stop(WRONG_INPUT, in_words(error))
         except KeyboardInterrupt as error:
             stop(FAILED, str(error) or "interrupted")
         except OSError as error:
@@ -72,6 +72,33 @@ class ErrorsInOneLine(click.Group):
                 f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno});"
                 " please report this",
             )
+
+
+KINDS = {
+    "valid integer range": "whole number",
+    "valid integer": "whole number",
+    "valid float range": "number",
+    "valid float": "number",
+}
+"""What click calls numbers, and what people do."""
+
+
+def in_words(error: click.ClickException) -> str:
+    """What click says, with what was expected where it leaves that out."""
+    message = error.format_message()
+    for theirs, ours in KINDS.items():
+        message = message.replace(f"is not a {theirs}", f"is not a {ours}")
+    context = getattr(error, "ctx", None)
+    words = isinstance(error, click.MissingParameter) and isinstance(error.param, click.Argument)
+    if context is not None and (words or "extra argument" in message):
+        names = [p.make_metavar(context) for p in context.command.params if is_word(p)]
+        message = f"{message.rstrip('.')}; expected {context.command.name} {' '.join(names)}"
+    return message
+
+
+def is_word(param: click.Parameter) -> bool:
+    """Whether it has no name on the command line."""
+    return isinstance(param, click.Argument)
 
 
 STDOUT = "stdout"

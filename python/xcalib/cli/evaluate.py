@@ -26,6 +26,7 @@ from .arguments import (
     say_depth,
     threads_option,
     with_scalar_sources,
+    with_straight_rows,
 )
 from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Input, Output
@@ -82,6 +83,7 @@ def command(
         print_plan(frames, [json_file])
         return
     frames = with_scalar_sources(frames, source_colormap)
+    frames = with_straight_rows(frames, inputs, rig)
     result = evaluate(
         rig,
         progress(frames.references, len(frames), "evaluating", quiet),

@@ -7,9 +7,14 @@ from typing import Any
 
 import click
 
-from .._core import TimeOffset, parse_time_offset
+from .._core import TimeOffset, parse_readout, parse_time_offset
 from ..footage import METHODS
 from .options import file
+
+
+def readout(ctx: click.Context, param: click.Parameter, value: str) -> float | None:
+    """Parse a share, or ``auto``: None."""
+    return parse_readout(param.opts[0], value)
 
 
 def clock_offset(ctx: click.Context, param: click.Parameter, value: str) -> TimeOffset:
@@ -55,5 +60,17 @@ FOOTAGE_OPTIONS: tuple[Callable[[Any], Any], ...] = (
         show_default=True,
         help="Image files that say how their picture is to be turned: take pixels as they are"
         " stored, or turn them.",
+    ),
+    *(
+        click.option(
+            f"--{camera}-readout",
+            metavar="SHARE",
+            default="0",
+            show_default=True,
+            callback=readout,
+            help=f"Rolling shutter of the {camera}: the time from its first row to its last, as a"
+            " share of that from frame to frame, 0 to 1; auto: calibrate finds it from what moves.",
+        )
+        for camera in ("source", "reference")
     ),
 )

@@ -15,15 +15,24 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class Input(click.Path):
-    """A file or a folder to read; an empty name would stand for the folder one is in."""
+    """A file or a folder to read; an empty name would stand for the folder one is in.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    urls
+        Whether what is behind a URL will do too; it stays text.
+    """
+
+    def __init__(self, urls: bool = False) -> None:
         super().__init__(path_type=Path)
+        self._urls = urls
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The name as a path."""
         if value == "":
             self.fail("the name is empty, expected a file or a folder", param, ctx)
+        if self._urls and "://" in str(value):
+            return str(value)
         return super().convert(value, param, ctx)
 
 
@@ -35,14 +44,19 @@ class Output(click.Path):
     check
         `_core.check_file_writable` or `_core.check_output_writable`. It sees the name as it was
         given: a `Path` has no slash at its end, and is never empty.
+    urls
+        Whether what is behind a URL will do too; it stays text.
     """
 
-    def __init__(self, check: Callable[[str], None]) -> None:
+    def __init__(self, check: Callable[[str], None], urls: bool = False) -> None:
         super().__init__(path_type=Path)
         self._check = check
+        self._urls = urls
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The name as a path."""
+        if self._urls and "://" in str(value):
+            return str(value)
         self._check(str(value))
         return super().convert(value, param, ctx)
 

@@ -14,6 +14,7 @@ from .arguments import (
     dry_run_option,
     frames_arguments,
     given_files,
+    inputs_of,
     load_rig,
     open_frames,
     print_plan,
@@ -21,10 +22,12 @@ from .arguments import (
     rig_argument,
     say_depth,
     threads_option,
+    with_straight_rows,
 )
 from .errors import NOT_TRUSTED, require_trusted, stop
 from .options import Output
 from .sections import Sectioned
+from .workers_options import require_all, workers_options
 
 
 @click.command(
@@ -37,7 +40,7 @@ from .sections import Sectioned
     "-o",
     "--output",
     metavar="OUT",
-    type=Output(check_output_writable),
+    type=Output(check_output_writable, urls=True),
     required=True,
     help="Folder to write to: images under the reference's names, and masks/. Or a video: .mp4,"
     " .avi (8 bit), .mkv (without loss, gray also 16 bit), and its masks.",
@@ -62,15 +65,18 @@ from .sections import Sectioned
     help="Pixels hidden from the source by something nearer: not marked, marked in the mask, or"
     " black as well.",
 )
+@workers_options
 @threads_option
 @quiet_option
 def command(
     rig_file: Path,
-    output: Path,
+    output: Path | str,
     overlays: bool,
     overwrite: bool,
     nearest: bool,
     occlusion: str,
+    workers: int,
+    scheduler: str | None,
     threads: int,
     quiet: bool,
     dry_run: bool,
@@ -83,15 +89,27 @@ def command(
     Interrupted, the same command resumes: what is whole is not made again.
     """
     rig = load_rig(rig_file)
-    frames = open_frames(inputs, threads, rig)
+    frames = with_straight_rows(open_frames(inputs, threads, rig), inputs, rig, nearest)
     if dry_run:
         print_plan(frames, [output])
         return
     how = RegistrationOptions(threads, overlays, nearest, occlusion, overwrite)
     reads = [rig_file, *given_files(inputs)]
-    total = run_registration(frames, rig, output, how, inputs, quiet, reads)
-    click.echo(f"{total.summary()}: {output}")
-    say_depth(frames)
-    if not total.valid:
+    if workers or scheduler or isinstance(output, str):
+        from ..batch import open_workers, register
+
+        with open_workers(scheduler, workers) as several:
+            opened = inputs_of(inputs, threads)
+            done = register(opened, rig, output, how, several, None, frames, inputs, reads, quiet)
+        click.echo(f"{done.summary()}: {output}")
+        say_depth(frames)
+        require_all(done)
+        valid = done.valid
+    else:
+        total = run_registration(frames, rig, output, how, inputs, quiet, reads)
+        click.echo(f"{total.summary()}: {output}")
+        say_depth(frames)
+        valid = total.valid
+    if not valid:
         stop(NOT_TRUSTED, f"no pixel of {output} is valid; see its masks")
     require_trusted(rig, rig_file)

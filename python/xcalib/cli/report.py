@@ -10,6 +10,7 @@ import click
 
 from ..frames import InputError, check_file_writable
 from ..report.run import load_document, of_report
+from .arguments import config_option, dry_run_option, print_plan
 from .options import Input, Output
 
 PICTURE = "expected_error_map"
@@ -25,17 +26,26 @@ PICTURE = "expected_error_map"
     type=Output(check_file_writable),
     help="Write a page to look at: pictures, charts, the rig.  [default: print the report]",
 )
-def command(run: Path, output: Path | None) -> None:
+@config_option
+@dry_run_option
+def command(run: Path, output: Path | None, dry_run: bool) -> None:
     """Print the report that `xcalib calibrate --report FILE` wrote, or make a page of it.
 
     RUN is that file, or the folder of `xcalib demo`. The page shows the frames themselves: they
     are read again from where they were.
     """
+    if output is None and dry_run:
+        click.echo(f"would be printed: {load_document(run)[0]}")
+        return
     if output is None:
         click.echo("\n".join(lines_of(load_document(run)[1])))
         return
     if output.suffix.lower() != ".html":
         raise InputError(f"{output}: expected a name that ends in .html")
+    if dry_run:
+        with of_report(run.absolute()) as found:
+            print_plan(found.frames, [output], found.chosen)
+        return
     from ..report.page import write_page  # it loads much
 
     file = output.absolute()

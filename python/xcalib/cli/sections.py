@@ -13,6 +13,8 @@ FOOTAGE = (
     "source_times",
     "exif_orientation",
     "source_colormap",
+    "source_readout",
+    "reference_readout",
 )
 RARE = (
     *("camera_height", "horizon", "far", "plane_hfov", "plane_roll"),

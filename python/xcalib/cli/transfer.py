@@ -25,9 +25,11 @@ from ..labels.yolo import transfer_yolo
 from ..progress import progress
 from .arguments import (
     check_writes,
+    dry_run_option,
     frames_arguments,
     load_rig,
     open_frames,
+    print_plan,
     quiet_option,
     rig_argument,
     threads_option,
@@ -39,6 +41,7 @@ from .options import Input, output_option
 @click.command("transfer", short_help="Carry labels from one camera's images to the other's.")
 @rig_argument
 @frames_arguments
+@dry_run_option
 @click.option(
     "--labels",
     metavar="LABELS",
@@ -64,6 +67,7 @@ def command(
     output: Path,
     threads: int,
     quiet: bool,
+    dry_run: bool,
     **inputs: Any,
 ) -> None:
     """Carry labels from one camera's images to the other's, through depth.
@@ -72,16 +76,27 @@ def command(
     pixel. What is outside is left out; what is clipped, occluded or ambiguous is counted, and noted
     in COCO files.
     """
+    if inputs["source_readout"] != 0 or inputs["reference_readout"] != 0:
+        raise click.UsageError(
+            "--source-readout and --reference-readout go with images, not with labels; expected"
+            " neither"
+        )
     rig = load_rig(rig_file)
     frames = open_frames(inputs, threads, rig)
     check_writes([output], frames, inputs, rig_file, labels)
-    labelled = LabelledFrames(frames, frames.fit(rig), to)
     if labels.is_dir():
         check_folder_writable(output)
+    else:
+        check_file_writable(str(output))
+    if dry_run:
+        print_plan(frames, [output])
+        click.echo(f"labels: {labels}")
+        return
+    labelled = LabelledFrames(frames, frames.fit(rig), to)
+    if labels.is_dir():
         for name, data in of_folder(labels, labelled, quiet).items():
             write_bytes(output / name, data)
     else:
-        check_file_writable(str(output))
         write_bytes(output, of_file(labels, labelled).encode())
     click.echo(f"{labelled.summary()}: {output}")
     gone = sum(labelled.counts[what] for what in ("outside", "no depth", "ambiguous"))

@@ -15,12 +15,15 @@ from ..rerun_log import write_rerun
 from ..view import rate_of, registered, write_view
 from .arguments import (
     check_writes,
+    dry_run_option,
     frames_arguments,
     load_rig,
     open_frames,
+    print_plan,
     quiet_option,
     rig_argument,
     threads_option,
+    with_straight_rows,
 )
 from .errors import require_trusted, warn
 from .options import output_option
@@ -29,6 +32,7 @@ from .options import output_option
 @click.command("view", short_help="Overlays of registered frames, or a recording for Foxglove.")
 @rig_argument
 @frames_arguments
+@dry_run_option
 @output_option(
     "Folder of images (.png), a video (.mp4, .avi, .mkv), or a recording with the cameras and"
     " the registered images themselves, for Foxglove and ROS 2 (.mcap) or Rerun (.rrd)."
@@ -43,17 +47,26 @@ from .options import output_option
 @threads_option
 @quiet_option
 def command(
-    rig_file: Path, output: Path, overlay: str, threads: int, quiet: bool, **inputs: Any
+    rig_file: Path,
+    output: Path,
+    overlay: str,
+    threads: int,
+    quiet: bool,
+    dry_run: bool,
+    **inputs: Any,
 ) -> None:
     """Show every SOURCE image on its REFERENCE image, to look at."""
     rig = load_rig(rig_file)
-    frames = open_frames(inputs, threads, rig)
+    frames = with_straight_rows(open_frames(inputs, threads, rig), inputs, rig)
     check_writes([output], frames, inputs, rig_file)
     suffix = output.suffix.lower()
     if suffix in (".mp4", ".avi", ".mkv", ".mcap", ".rrd"):
         check_file_writable(str(output))
     else:
         check_folder_writable(output)
+    if dry_run:
+        print_plan(frames, [output])
+        return
     every = progress(registered(frames, rig, threads), len(frames), "showing", quiet)
     if suffix == ".rrd":
         count = write_rerun(every, frames.fit(rig), output)

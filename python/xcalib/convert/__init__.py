@@ -16,7 +16,7 @@ from pathlib import Path
 from .._core import InputError, Pinhole, Rig, check_folder_writable
 from ..frames import check_file_writable, write_bytes
 from ..pipeline import save_rig
-from . import authors, colmap, foxglove, kalibr, mrcal, nerfstudio, opencv, ros, xcalib_rig
+from . import authors, colmap, flir, foxglove, kalibr, mrcal, nerfstudio, opencv, ros, xcalib_rig
 from .format import Format, Sizes
 from .loss import TOLERANCE, held
 
@@ -24,7 +24,18 @@ __all__ = ["FORMATS", "TOLERANCE", "is_foreign", "read_camera", "read_rig", "wri
 
 FORMATS: Mapping[str, Format] = {
     module.FORMAT.name: module.FORMAT
-    for module in (xcalib_rig, opencv, ros, kalibr, mrcal, colmap, nerfstudio, foxglove, authors)
+    for module in (
+        xcalib_rig,
+        opencv,
+        ros,
+        kalibr,
+        mrcal,
+        colmap,
+        nerfstudio,
+        foxglove,
+        authors,
+        flir,
+    )
 }
 
 HEAD = 1 << 16

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import remote
 from .._core import DepthUnits, metres_of, read_array, units_line
 from ..frames import Image, InputError, decode, list_files, pair, same_aspect, size_of
 from .provider import Depth, DepthProvider
@@ -44,7 +45,7 @@ class FolderDepth(DepthProvider):
         return fitting(read_depth(path, self.units), reference, str(path))
 
     def files_of(self, index: int) -> list[Path]:
-        return [self.paths[index]]
+        return [remote.identity(self.paths[index])]
 
     def line(self) -> str:
         try:
@@ -75,6 +76,11 @@ def is_png(path: Path) -> bool:
 
 def read_numbers(path: Path) -> NDArray[Any]:
     """The numbers of one depth map as they are stored: (h, w) uint16 or float32."""
+    with remote.named(path):
+        return _read_numbers(path)
+
+
+def _read_numbers(path: Path) -> NDArray[Any]:
     array = read_array(path, is_image=False)
     if array is not None:
         return array

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .._core import RelativeDepth
 from ..cache import ResultCache, file_hash
 from ..frames import Image, InputError, Size, same_aspect, size_of
-from ..onnx import ImageInput, Network
+from ..onnx import ImageInput, open_network
 from .provider import Depth, DepthProvider, reciprocal
 from .recipes import Recipe, find_recipe
 
@@ -110,7 +110,7 @@ class NetworkDepth(DepthProvider):
                 " reference camera, expected --depth-focal PX (translations scale with it,"
                 " registered images do not depend on it)"
             )
-        self.network = Network(self.path, options.providers, options.num_threads)
+        self.network = open_network(self.path, options.providers, options.num_threads)
         self.input = ImageInput.of(self.network)
         output = self.network.output(recipe.output)
         self._outputs = [output.name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from .. import _core
 from .._core import CalibrationOptions, Rig
@@ -15,6 +16,16 @@ class PlaneDepth(_core.PlaneDepth, DepthProvider):
 
     is_parallel = True
     looks_at_reference = False
+
+    @property
+    def _numbers(self) -> tuple[float, float, float, float | None, float]:
+        return self.camera_height, self.horizon, self.far, self.hfov_deg, self.roll_deg
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PlaneDepth, self._numbers
+
+    def __repr__(self) -> str:
+        return f"PlaneDepth{self._numbers}"
 
     def fitted(
         self,

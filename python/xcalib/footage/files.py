@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from .. import remote
 from .._core import natural_order, times_beside, times_of_names
 from ..frames import (
     ARRAY_SUFFIXES,
@@ -44,19 +45,21 @@ class ImageFiles(Stream):
         return len(self.paths)
 
     def read(self, index: int) -> Image:
-        return read_image(self.paths[index])
+        with remote.named(self.paths[index]):
+            return read_image(self.paths[index])
 
     def name(self, index: int) -> str:
         return self.paths[index].stem
 
     def where(self, index: int) -> str:
-        return str(self.paths[index])
+        return remote.shown(self.paths[index])
 
     def file(self, index: int) -> Path:
-        return self.paths[index]
+        return remote.identity(self.paths[index])
 
     def header_file(self, index: int) -> Path:
         """The file whose header says the frame's size."""
+        remote.fetch(self.paths[index])
         return self.paths[index]
 
 

@@ -43,7 +43,8 @@ class Journal {
     Journal(const Journal&) = delete;
     Journal& operator=(const Journal&) = delete;
 
-    // Whose files are all there, in the size that they were written.
+    // Those of earlier runs whose files are all there, in the size that they were written. What
+    // this run notes is not kept: memory would grow with every frame.
     const std::vector<Unit>& units() const { return units_; }
 
     // What it says that the output was made with, by name; empty where it says nothing of that.
@@ -56,7 +57,7 @@ class Journal {
     // the disk then.
     void append(std::vector<std::pair<std::string, long>> frames,
                 const std::vector<std::string>& files);
-    void append(std::vector<Unit> units);
+    void append(const std::vector<Unit>& units);
 
     // Before the first file has its name: from here on what is called as this output's files is of
     // runs that this journal is of, noted or not.

@@ -12,6 +12,10 @@ namespace XCALIB_EXPORT xcalib {
 // read from the data.
 std::string tiff_pixel_type(std::string_view data);
 
+// Says of the unsigned 32-bit pixels of a file's first page that they are signed, as decoders want
+// them; false where it has none.
+bool put_as_signed(std::string& data);
+
 // Makes the page of full size the first of a TIFF file, as of one that begins with a thumbnail;
 // other files stay as they are. Throws InputError, naming `name`, where several pages are of that
 // size.
