@@ -14,9 +14,11 @@ if [ ! -e "$root/usr/bin/python3" ]; then
 fi
 version=$(chroot "$root" python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 rm -rf "$root/opt/site" "$root/demo"
+glibc=$(chroot "$root" ldd --version | sed -n '1s/.*2\.//p')
+platforms=(--platform "manylinux2014_$(uname -m)")
+for ((minor = 17; minor <= glibc; ++minor)); do platforms+=(--platform "manylinux_2_${minor}_$(uname -m)"); done
 "$python" -m pip --disable-pip-version-check install -q --target "$root/opt/site" --python-version "$version" \
-    --implementation cp --only-binary=:all: --platform manylinux_2_36_"$(uname -m)" --platform manylinux_2_28_"$(uname -m)" \
-    --platform manylinux2014_"$(uname -m)" "$wheels"/xcalib_rgbt-*-cp"${version/./}"-*.whl
+    --implementation cp --only-binary=:all: "${platforms[@]}" "$wheels"/xcalib_rgbt-*-cp"${version/./}"-*.whl
 for needed in libopencv libceres libyaml-cpp libhwy; do
     ! chroot "$root" ldconfig -p | grep "$needed"
 done

@@ -7,7 +7,7 @@ set -euo pipefail
 
 folder=$(mkdir -p "$1" && cd "$1" && pwd)
 mkdir -p "$folder"/{lists/partial,archives,source}
-suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
+suite=bookworm  # whatever runs this: one set of versions
 echo "deb-src http://deb.debian.org/debian $suite main" > "$folder/sources.list"
 apt=(apt-get -q -o "Dir::Etc::sourcelist=$folder/sources.list" -o Dir::Etc::sourceparts=- -o "Dir::State::lists=$folder/lists"
     -o APT::Get::List-Cleanup=0)
@@ -34,7 +34,9 @@ build() { # package, CMake's options
 "${apt[@]}" update
 build yaml-cpp -DYAML_CPP_BUILD_TESTS=OFF -DYAML_CPP_BUILD_TOOLS=OFF
 build highway -DHWY_ENABLE_TESTS=OFF -DHWY_ENABLE_EXAMPLES=OFF -DHWY_ENABLE_CONTRIB=OFF
-build ceres-solver -DMINIGLOG=ON -DGFLAGS=OFF -DCUDA=OFF -DSUITESPARSE=OFF -DCXSPARSE=OFF -DLAPACK=OFF -DBUILD_EXAMPLES=OFF \
+mkdir -p "$folder/include/hwy/contrib"  # of which headers are enough
+cp -r "$folder/source/highway/hwy/contrib/math" "$folder/include/hwy/contrib"
+build ceres-solver -DMINIGLOG=ON -DMINIGLOG_MAX_LOG_LEVEL=-2 -DGFLAGS=OFF -DCUDA=OFF -DSUITESPARSE=OFF -DCXSPARSE=OFF -DLAPACK=OFF -DBUILD_EXAMPLES=OFF \
     -DBUILD_BENCHMARKS=OFF -DSCHUR_SPECIALIZATIONS=OFF -DEIGENSPARSE=ON
 build opencv -DBUILD_LIST=core,imgproc -DBUILD_TESTS=OFF -DBUILD_PERF_TESTS=OFF -DBUILD_opencv_apps=OFF \
     -DBUILD_JAVA=OFF -DBUILD_opencv_python3=OFF -DOPENCV_GENERATE_PKGCONFIG=OFF -DBUILD_ZLIB=OFF -DWITH_PROTOBUF=OFF \

@@ -167,6 +167,7 @@ def test_how_a_drive_is_cut() -> None:
     assert shard_size(36_000, 2) == 250
     assert shard_size(1_000, 2) == 63
     assert shard_size(10, 1000) == 16
+    assert shard_size(36_000, 1000, drives=1000) == 2500
 
 
 # -- Drives ----------------------------------------------------------------------------------------

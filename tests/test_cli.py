@@ -285,8 +285,14 @@ def test_file_for_folder_and_empty_folder(scene: Path, refused: Refused) -> None
     assert f"{scene / 'none'}: empty" in line
 
 
-@pytest.mark.parametrize("kind", ["visible", "thermal", "depth"])
-@pytest.mark.parametrize("command", ["register", "evaluate"])
+@pytest.mark.parametrize(
+    ("command", "kind"),
+    [
+        ("register", "thermal"),
+        ("register", "depth"),
+        *(("evaluate", kind) for kind in ("visible", "thermal", "depth")),
+    ],
+)
 def test_truncated_image(scene: Path, rendered: Path, kind: str, command: str) -> None:
     """In a process of its own: image libraries print past Python's stderr."""
     path = files(scene / kind)[0]
@@ -307,6 +313,14 @@ def test_truncated_image(scene: Path, rendered: Path, kind: str, command: str) -
         rf"error: {re.escape(str(path))}: cannot decode .*truncated.*\n", result.stderr
     )
     assert sorted(scene.parent.rglob("*")) == before
+
+
+def test_a_truncated_reference_that_nobody_looks_at(scene: Path, rendered: Path) -> None:
+    path = files(scene / "visible")[0]
+    path.write_bytes(path.read_bytes()[:-20])
+    result = run("register", rendered / "rig.yaml", *folders(scene), "-o", scene / "out")
+    assert result.exit_code == 0, result.stderr
+    assert len(files(scene / "out")) == FRAMES
 
 
 def test_truncated_jpeg(scene: Path, refused: Refused) -> None:

@@ -51,19 +51,23 @@ class Run:
 
     def await_frames(self, count: int) -> None:
         """Until so many frames are noted; fails if the run is over before."""
-        journal = self.out / "register.jsonl"
-        deadline = time.monotonic() + 120
-        while time.monotonic() < deadline:
-            assert self.process.poll() is None, self.process.communicate()
-            if journal.is_file() and journal.read_text().count('"files"') > count:
-                return
-            time.sleep(0.01)
-        raise TimeoutError(self.out)
+        await_notes(self.process, self.out, count)
 
     def end(self, code: int = 0) -> tuple[str, str]:
         out, err = self.process.communicate(timeout=240)
         assert self.process.returncode == code, out + err
         return out, err
+
+
+def await_notes(process: subprocess.Popen[str], out: Path, count: int) -> None:
+    journal = out / "register.jsonl"
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline:
+        assert process.poll() is None, process.communicate()
+        if journal.is_file() and journal.read_text().count('"files"') > count:
+            return
+        time.sleep(0.01)
+    raise TimeoutError(out)
 
 
 def frames_noted(out: Path) -> list[str]:
@@ -88,6 +92,25 @@ def test_a_worker_that_is_killed(
     assert frames_noted(tmp_path / "out") == [f"{index:04d}" for index in range(120)]
     out, _ = Run(cluster, drive, tmp_path / "out").end()
     assert out.startswith("nothing to do: all 120 frames are there")
+
+
+@long
+def test_a_process_that_is_killed(
+    drive: Path, registered: dict[str, bytes], tmp_path: Path
+) -> None:
+    command = [sys.executable, "-m", "xcalib", *arguments(drive, tmp_path / "out")]
+    process = subprocess.Popen([*command, "--workers", "2"], stdout=subprocess.PIPE, text=True)
+    await_notes(process, tmp_path / "out", 0)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    workers = [
+        pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    ]
+    assert len(workers) == 2
+    os.kill(int(workers[0]), signal.SIGKILL)
+    out, _ = process.communicate(timeout=240)
+    assert process.returncode == 0
+    assert out.startswith("120 frames, ")
+    assert contents(tmp_path / "out") == registered
 
 
 @long

@@ -14,7 +14,7 @@ from click.testing import Result
 import xcalib
 from conftest import FRAMES, Process, run
 from xcalib import Rig, metrics
-from xcalib.depth import read_depth
+from xcalib.depth import PlaneDepth, read_depth
 from xcalib.frames import Image, list_files, read_image
 
 
@@ -164,6 +164,17 @@ def test_depth_that_is_wrong_is_named(
     assert not verdict.trusted
     assert reason in verdict.reason
     assert advice in verdict.advice
+
+
+def test_a_road_plane_is_not_called_mirrored(rendered: Path) -> None:
+    references, sources = (
+        [read_image(path) for path in list_files(rendered / name)]
+        for name in ("visible", "thermal")
+    )
+    plane = [PlaneDepth()(0, references[0])] * len(references)  # it is its own mirror image
+    verdict = xcalib.calibrate(references, sources, plane).report.verdict
+    assert verdict.found
+    assert "mirrored" not in verdict.reason
 
 
 def test_the_same_footage_twice_is_named(rendered: Path) -> None:

@@ -47,6 +47,26 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: REGISTRAR.map(DEPTH, depth=DEPTH),  # type: ignore[misc]
         "Registrar.map() was given 'depth' twice",
     ),
+    "an option of the options": (
+        lambda: xcalib.calibrate(IMAGES, IMAGES, DEPTHS, max_frames=4),  # type: ignore[call-arg]
+        "has no argument 'max_frames', options=xcalib.CalibrationOptions(max_frames=4) has",
+    ),
+    "two numbers for three": (
+        lambda: setattr(copy.deepcopy(RIG), "t", (1, 2)),
+        "Rig.t is a tuple, expected as many numbers as it has",
+    ),
+    "half a thread": (
+        lambda: Registrar(RIG, 2.5),  # type: ignore[arg-type]
+        "num_threads is 2.5, expected a whole number",
+    ),
+    "paths to evaluate": (
+        lambda: xcalib.evaluate(RIG, "visible", IMAGES, DEPTHS),  # type: ignore[arg-type]
+        "evaluate(): references is the path 'visible', expected images; xcalib.footage.open_stream",
+    ),
+    "a path of a rig to evaluate": (
+        lambda: xcalib.evaluate("rig.yaml", IMAGES, IMAGES, DEPTHS),  # type: ignore[arg-type]
+        "evaluate(): rig is 'rig.yaml', expected an xcalib.Rig; xcalib.Rig.load reads one",
+    ),
     "misspelt option": (
         lambda: CalibrationOptions(max_frame=8),
         "CalibrationOptions: unknown option 'max_frame', did you mean 'max_frames'?",
@@ -296,6 +316,21 @@ def test_values_are_compared_copied_pickled_and_shown(name: str) -> None:
     if name.endswith("Options"):
         assert value != type(value)()
         assert eval(repr(value), vars(xcalib)) == value  # what it says makes the same
+
+
+def test_a_camera_of_a_matrix() -> None:
+    lens = Lens("brown", [-0.3, 0.1, 0, 0])
+    camera = Pinhole.from_K(64, 48, 2 * CAMERA.K, lens)  # of any scale, as homogeneous matrices are
+    assert pytest.approx(CAMERA.K) == camera.K and camera.lens == lens
+    with pytest.raises(ValueError, match="fx"):
+        Pinhole.from_K(64, 48, np.diag([-1.0, 1, 1]))
+
+
+def test_results_are_shown_in_a_line() -> None:
+    result = xcalib.evaluate(RIG, IMAGES, IMAGES, DEPTHS)
+    assert repr(result).startswith("Evaluation(2 frames, ") and "NEC" in repr(result)
+    choice = xcalib.choose_frames(IMAGES, IMAGES, DEPTHS, 1, 0)
+    assert "Choice(" in repr(choice)
 
 
 def test_a_copy_is_changed_alone() -> None:

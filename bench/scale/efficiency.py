@@ -1,12 +1,13 @@
 """Shards on a Dask cluster: from one worker to two, and memory of a worker.
 
-A scheduler and workers of one thread each are started on the loopback address. The same frames are
-registered by one worker and by two, in turns: warp-bound, with depth from files, and depth-bound,
-with sparse depth that is completed in each frame. Efficiency is the speed with two over twice that
-with one. Before each turn the workers have opened the drive: what is measured is steady work.
+Two schedulers are started on the loopback address, one with a worker of one thread, one with two.
+The same frames are registered by each, in turns: warp-bound, with depth from files, and
+depth-bound, with depth that is completed in each frame. Efficiency is the speed with two over twice
+that with one. Before each turn the workers have opened the drive: what is measured is steady work.
 """
 
 import argparse
+import contextlib
 import sys
 import tempfile
 import time
@@ -27,28 +28,10 @@ from stream import write
 from cluster import open_cluster
 
 
-class Some(DaskWorkers):
-    """Some of the workers of a scheduler."""
-
-    def __init__(self, address: str, count: int) -> None:
-        super().__init__(address)
-        self.names = sorted(self._client.nthreads())[:count]
-
-    @property
-    def slots(self) -> int:
-        return len(self.names)
-
-    def _others(self, avoid, beside):
-        return [name for name in self.names if name not in avoid]
-
-    def submit(self, ticket, shard, avoid=(), beside=()) -> None:
-        super().submit(ticket, shard, avoid, beside or (0,))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=400)
-    parser.add_argument("--shard", type=int, default=25)
+    parser.add_argument("--frames", type=int, default=1200)
+    parser.add_argument("--shard", type=int, default=60)
     parser.add_argument("--width", type=int, default=640)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--work", type=Path, help="where frames are kept, or are from before")
@@ -70,12 +53,17 @@ def main() -> None:
             write(kept, rig, given.frames, "folder")
         if given.only_write:
             return
-        (folder / "cluster").mkdir()
-        with open_cluster(folder / "cluster") as cluster:
-            wait = DaskWorkers(cluster.address)
-            while wait.slots < 2:
-                time.sleep(0.2)
-            wait.close()
+        with contextlib.ExitStack() as stack:
+            addresses = {}
+            for count in (1, 2):
+                place = folder / f"cluster{count}"
+                place.mkdir()
+                addresses[count] = stack.enter_context(open_cluster(place, count)).address
+            for count, address in addresses.items():
+                wait = DaskWorkers(address)
+                while wait.slots < count:
+                    time.sleep(0.2)
+                wait.close()
             for kind in given.kinds:
                 measured = MeasuredDepth(complete=kind == "depth")
                 inputs = Inputs(visible, thermal, kept / "depth", measured=measured)
@@ -83,7 +71,7 @@ def main() -> None:
                 peak = 0
                 for turn in range(given.rounds + 1):
                     for count in (1, 2) if turn % 2 else (2, 1):
-                        workers = Some(cluster.address, count)
+                        workers = DaskWorkers(addresses[count])
                         out = folder / f"{kind}{turn}{count}"
                         start = time.perf_counter()
                         done = register(inputs, rig, out, None, workers, given.shard)

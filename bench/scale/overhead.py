@@ -46,6 +46,12 @@ def milliseconds(workers: Workers, count: int, load: bytes) -> float:
     return 1e3 * (time.perf_counter() - start) / count
 
 
+def seconds_of(process: int) -> float:
+    """Processor time of another process."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--shards", type=int, default=500)
@@ -100,7 +106,12 @@ def main() -> None:
             dask = DaskWorkers(cluster.address)
             while dask.slots < 2:
                 time.sleep(0.2)
+            before = seconds_of(cluster.scheduler.pid), time.process_time()
             figure("Dask, 2 workers", milliseconds(dask, given.shards, load), "ms a shard")
+            after = seconds_of(cluster.scheduler.pid), time.process_time()
+            for name, first, last in zip(("scheduler", "driver"), before, after, strict=True):
+                own = 1e3 * (last - first) / (given.shards + 8)
+                figure(f"processor time of the {name} then", own, "ms a shard")
             dask.close()
 
 

@@ -39,7 +39,7 @@ class Pages : public Stream {
         std::vector<cv::Mat> pages;
         try {
             cv::imreadmulti(path_.string(), pages, index, 1, cv::IMREAD_UNCHANGED);
-        } catch (const cv::Exception&) {
+        } catch (const std::exception&) {  // of OpenCV; of memory, for a size that is claimed
             pages.clear();
         }
         if (pages.size() != 1) throw DecodeError(where(index) + ": cannot decode, truncated");

@@ -119,7 +119,7 @@ cv::Mat decode_bytes(std::string data, const std::string& name) {
         try {
             const cv::Mat bytes(1, static_cast<int>(data.size()), CV_8U, data.data());
             pixels = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
-        } catch (const cv::Exception&) {
+        } catch (const std::exception&) {  // of OpenCV; of memory, for a size that is claimed
             pixels.release();
         }
     }

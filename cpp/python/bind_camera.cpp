@@ -82,6 +82,16 @@ Pixel centres lie at integer coordinates; all lengths in pixels. Fields may be s
             py::arg("width"), py::arg("height"), py::arg("hfov_deg"), py::arg("lens") = py::none(),
             "Square pixels and the principal point at the centre; hfov_deg in (0, 180), and no "
             "wider than what the lens shows.")
+        .def_static(
+            "from_K",
+            [](int width, int height, const Eigen::Matrix3d& K, const std::optional<Lens>& lens) {
+                Pinhole camera = Pinhole::from_K(width, height, K);
+                if (lens) camera.lens = *lens;
+                camera.validate("camera");
+                return camera;
+            },
+            py::arg("width"), py::arg("height"), py::arg("K"), py::arg("lens") = py::none(),
+            "Of a (3, 3) intrinsic matrix [px], as OpenCV has it.")
         .def_readwrite("width", &Pinhole::width, "[px]")
         .def_readwrite("height", &Pinhole::height, "[px]")
         .def_readwrite("fx", &Pinhole::fx, "[px]")

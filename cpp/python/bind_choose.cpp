@@ -50,6 +50,12 @@ void bind_choose(py::module_& m) {
         .def_property_readonly("unusable", &Choice::unusable,
                                "Candidates that something was found against: they never were in "
                                "the choice.")
+        .def("__repr__",
+             [](const Choice& choice) {
+                 return "Choice(" + std::to_string(choice.indices.size()) + " of " +
+                        std::to_string(choice.candidates.size()) + " frames looked at, " +
+                        std::to_string(choice.unusable().size()) + " unusable)";
+             })
         .def("table", &Choice::table, py::arg("names"),
              "One line per candidate: its name, what was measured, why it was taken or left.");
     m.def("choose", &choose, py::arg("candidates"), py::arg("max_frames"),

@@ -1,6 +1,7 @@
 #include <pybind11/stl.h>
 
 #include "arrays.hpp"
+#include "base/format.hpp"
 #include "bindings.hpp"
 #include "json.hpp"
 #include "xcalib/judge/evaluate.hpp"
@@ -42,6 +43,14 @@ void bind_evaluation(py::module_& m) {
                 return object_of(json_of(*e.given));
             },
             "The same of images that another method registered, or None.")
+        .def("__repr__",
+             [](const Evaluation& e) {
+                 return format(
+                     "Evaluation(%zu frames, %.1f %% valid; NEC %.4f, %.4f without;"
+                     " GC %.4f, %.4f without)",
+                     e.frames.size(), 100 * e.valid_share, e.registered[0], e.unregistered[0],
+                     e.registered[1], e.unregistered[1]);
+             })
         .def("table", &Evaluation::table, "The scores as text, one line each.");
 }
 

@@ -5,6 +5,7 @@
 >>> image, mask = registrar.register(source, depth)
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -51,7 +52,9 @@ else:
         elif name in __all__:
             value = getattr(import_module("xcalib._core"), name)
         else:
-            raise AttributeError(f"module 'xcalib' has no attribute {name!r}")
+            raise AttributeError(
+                f"module 'xcalib' has no attribute {name!r}", name=name, obj=sys.modules[__name__]
+            )
         globals()[name] = value
         return value
 

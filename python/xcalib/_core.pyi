@@ -87,6 +87,9 @@ class Pinhole:
         """Square pixels and the principal point at the centre; hfov_deg in (0, 180), and no
         wider than what the lens shows.
         """
+    @staticmethod
+    def from_K(width: int, height: int, K: NDArray[Any], lens: Lens | None = None) -> Pinhole:
+        """Of a (3, 3) intrinsic matrix [px], as OpenCV has it."""
     @property
     def K(self) -> NDArray[float64]:
         """(3, 3) float64 intrinsic matrix [px], read-only."""

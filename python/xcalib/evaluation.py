@@ -8,12 +8,14 @@ and the unregistered source over the *same* pixels: those the registration can f
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Iterable
 from typing import Any
 
 from ._core import Evaluation, Evaluator, Rig, evaluation_document
 from .depth.provider import DepthProvider
 from .frames import Image
+from .wrong_calls import shown
 
 __all__ = ["Evaluation", "Evaluator", "evaluate", "evaluation_document"]
 
@@ -54,6 +56,18 @@ def evaluate(
     ValueError
         Where one of them has fewer frames than another, or an image cannot be used.
     """
+    if not isinstance(rig, Rig):
+        raise TypeError(
+            f"evaluate(): rig is {shown(rig)}, expected an xcalib.Rig; xcalib.Rig.load reads one"
+        )
+    named = {"references": references, "sources": sources, "depths": depths, "given": given}
+    for name, images in named.items():
+        if isinstance(images, (str, bytes, os.PathLike)):
+            opener = "depth.open_depth" if name == "depths" else "footage.open_stream"
+            raise TypeError(
+                f"evaluate(): {name} is the path {shown(images)}, expected images;"
+                f" xcalib.{opener} opens one"
+            )
     evaluator = Evaluator(rig, width, num_threads)
     if isinstance(depths, DepthProvider):
         # Depth wants the reference image too: tee hands it on, so that it is read once.

@@ -47,7 +47,8 @@ def file_system(url: str) -> tuple[Any, str]:
         files, path = fsspec.core.url_to_fs(url)
     except (ImportError, ValueError) as error:
         raise InputError(
-            f"{url}: the scheme {scheme}:// is not installed ({' '.join(str(error).split())})"
+            f"{url}: the scheme {scheme}:// is not installed ({' '.join(str(error).split())});"
+            " cameras are read by `xcalib-cli register --live`"
         ) from None
     except Exception as error:  # each file system has errors of its own
         raise InputError(f"{url}: {_brief(error)}") from None

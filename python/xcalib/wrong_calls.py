@@ -166,7 +166,7 @@ def fits(kind: str, value: Any) -> bool:
 
 def expected_of(kinds: list[str]) -> str:
     """What may be given, in words."""
-    words = [WORDS.get(kind, f"an xcalib.{kind}") for kind in kinds]
+    words = list(dict.fromkeys(WORDS.get(kind, f"an xcalib.{kind}") for kind in kinds))
     return ", ".join(words[:-1]) + " or " + words[-1] if len(words) > 1 else words[0]
 
 
@@ -194,11 +194,21 @@ def hint(kinds: list[str], value: Any) -> str:
     return ""
 
 
+def options() -> set[str]:
+    """Those of a calibration, which people give to it by themselves."""
+    from ._core import CalibrationOptions
+
+    fields = vars(CalibrationOptions).items()
+    return {name for name, value in fields if isinstance(value, property)}
+
+
 # -- The lines -------------------------------------------------------------------------------------
 
 
 def _wrong_value(name: str, doc: str, value: Any) -> str:
     kinds = kinds_of(parameters_of(doc)[-1].annotation)
+    if kinds == ["list"] and fits("list", value):
+        return f"{name} is {shown(value)}, expected as many numbers as it has"
     if any(fits(kind, value) for kind in kinds):
         return f"{name} is {shown(value)}, out of the range of its type"
     return f"{name} is {shown(value)}, expected {expected_of(kinds)}{hint(kinds, value)}"
@@ -220,6 +230,9 @@ def _wrong_call(name: str, doc: str, args: tuple[Any, ...], kwargs: dict[str, An
     given = dict(zip(names, args, strict=False))
     for key in kwargs:
         if key not in names:
+            if "options" in names and key in options():
+                made = f"xcalib.CalibrationOptions({key}={shown(kwargs[key])})"
+                return f"{name}() has no argument {key!r}, options={made} has"
             close = difflib.get_close_matches(key, names, 1)
             meant = f"did you mean {close[0]!r}?" if close else takes
             return f"{name}() has no argument {key!r}, {meant}"

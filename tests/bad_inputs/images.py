@@ -110,7 +110,7 @@ ROWS = [
     # -- folders and patterns
     opened("none", "none", "none: no such folder"),
     opened("camera", "0", "0: no such folder; cameras are read by `xcalib-cli register --live`"),
-    opened("address", "rtsp://cam/1", "/cam/1: no such folder; cameras are read by"),
+    opened("address", "rtsp://cam/1", "; cameras are read by `xcalib-cli register --live`"),
     opened("empty-name", "''", "REFERENCE"),
     opened("a-file", "rig.yaml", "rig.yaml is a file, expected a folder of"),
     opened("an-image", "visible/0.png", "visible/0.png is a file, expected a folder of"),

@@ -179,6 +179,7 @@ void write_whole(const Path& named, std::string_view data) {
         write_all(out, data, named);
         return;
     }
+    if (fs::is_directory(to.file)) fail(EISDIR, named);
     WholeFile file(to.file);
     file.write(data);
     file.keep();

@@ -44,6 +44,20 @@ WorkingImages with_each_depth(const WorkingImages& images, const Change& change)
     });
 }
 
+// The same with each map turned by `turn`, over the same pixels: what is unknown, burnt-in text
+// among it, stays where it is, and where the turned map knows nothing the own one does.
+template <class Turn>
+WorkingImages with_turned_depths(const WorkingImages& images, const Turn& turn) {
+    return with_depths(images, [&](std::vector<Image>& depths) {
+        for (Image& depth : depths) {
+            const std::vector<float> own = depth.pixels;
+            turn(depth);
+            for (std::size_t i = 0; i < own.size(); ++i)
+                if (!(own[i] > 0 && depth.pixels[i] > 0)) depth.pixels[i] = own[i];
+        }
+    });
+}
+
 // How well each frame's edges agree with the depth of the one that comes so much later.
 std::vector<double> with_depth_of(const WorkingImages& images, std::size_t later, const Rig& rig,
                                   int num_threads) {
@@ -166,16 +180,14 @@ DepthCheck check_depth(const WorkingImages& images, const Rig& rig, const Plan& 
     };
     const auto instead = [&](const auto& change) { return fits(with_each_depth(few, change)); };
     out.none = instead([&](float) { return 1 / middle; });
-    out.mirrored = fits(with_depths(few, [](std::vector<Image>& depths) {
-        for (Image& depth : depths)
-            for (int y = 0; y < depth.height; ++y)
-                std::reverse(depth.row(y), depth.row(y) + depth.width);
+    out.mirrored = fits(with_turned_depths(few, [](Image& depth) {
+        for (int y = 0; y < depth.height; ++y)
+            std::reverse(depth.row(y), depth.row(y) + depth.width);
     }));
-    out.upside_down = fits(with_depths(few, [](std::vector<Image>& depths) {
-        for (Image& depth : depths)
-            for (int y = 0; y < depth.height / 2; ++y)
-                std::swap_ranges(depth.row(y), depth.row(y) + depth.width,
-                                 depth.row(depth.height - 1 - y));
+    out.upside_down = fits(with_turned_depths(few, [](Image& depth) {
+        for (int y = 0; y < depth.height / 2; ++y)
+            std::swap_ranges(depth.row(y), depth.row(y) + depth.width,
+                             depth.row(depth.height - 1 - y));
     }));
     // Relative depth is an inverse depth of unknown shift: its inverse says nothing.
     if (!plan.options.relative_depth)

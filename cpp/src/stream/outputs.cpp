@@ -106,24 +106,24 @@ void check_output_writable(const Path& output) {
     check_folder_writable(output);
 }
 
-void check_apart(const std::vector<Path>& reads, const Writes& writes) {
-    std::map<Identity, Path> read;
+void check_apart(const std::vector<std::string>& reads, const Writes& writes) {
+    std::map<Identity, std::string> read;
     std::set<Identity> image_folders;
-    std::set<Path> seen, seen_folders;        // each is asked for once: there may be many
-    const auto add = [&](const Path& file) {  // is it a folder?
-        if (file.empty() || !seen.insert(file).second) return false;
+    std::set<std::string> seen, seen_folders;  // each is asked for once: there may be many
+    const auto add = [&](const Path& file) {   // is it a folder?
+        if (file.empty() || !seen.insert(file.string()).second) return false;
         struct stat about {};
         const bool there = stat(file.c_str(), &about) == 0;
-        if (there) read.emplace(Identity{about.st_dev, about.st_ino}, file);
+        if (there) read.emplace(Identity{about.st_dev, about.st_ino}, file.string());
         if (const Path folder = folder_of(file);
-            is_image(file) && seen_folders.insert(folder).second)
+            is_image(file) && seen_folders.insert(folder.string()).second)
             if (const auto identity = identity_of(folder)) image_folders.insert(*identity);
         return there && S_ISDIR(about.st_mode);
     };
-    for (const Path& path : reads) {
-        if (!add(path)) continue;
+    for (const std::string& name : reads) {
+        if (!add(name)) continue;
         std::error_code none;
-        for (const fs::directory_entry& entry : fs::directory_iterator(path, none))
+        for (const fs::directory_entry& entry : fs::directory_iterator(name, none))
             if (entry.is_regular_file(none)) add(entry.path());
     }
     for (const Path& folder : writes.folders) {
@@ -131,20 +131,20 @@ void check_apart(const std::vector<Path>& reads, const Writes& writes) {
         if (identity && (image_folders.count(*identity) || read.count(*identity)))
             refuse_folder(folder);
     }
-    std::map<Identity, Path> written;
-    std::set<Path> names;
-    std::map<Path, Path> folders;  // that links lead to
+    std::map<Identity, std::string> written;
+    std::set<std::string> names;
+    std::map<std::string, Path> folders;  // that links lead to
     const auto is_named_twice = [&](const Path& file) {
-        Path& folder = folders[folder_of(file)];
+        Path& folder = folders[folder_of(file).string()];
         if (folder.empty()) folder = fs::weakly_canonical(folder_of(file));
-        return !names.insert(folder / file.filename()).second;
+        return !names.insert((folder / file.filename()).string()).second;
     };
-    for (const Path& file : writes.files) {
+    for (const std::string& file : writes.files) {
         const auto identity = identity_of(file);
         if (identity && read.count(*identity)) {
-            const Path& input = read[*identity];
-            throw InputError(file.string() + " would be overwritten, but is an input" +
-                             (input == file ? "" : " (" + input.string() + ")") +
+            const std::string& input = read[*identity];
+            throw InputError(file + " would be overwritten, but is an input" +
+                             (input == file ? "" : " (" + input + ")") +
                              "; expected another output");
         }
         // Two that do not exist yet are distinguished by their names.
@@ -152,31 +152,37 @@ void check_apart(const std::vector<Path>& reads, const Writes& writes) {
             identity ? !written.emplace(*identity, file).second : is_named_twice(file);
         struct stat about {};
         if (twice && !(stat(file.c_str(), &about) == 0 && S_ISCHR(about.st_mode)))
-            throw InputError(file.string() + " would be written twice, expected another name");
+            throw InputError(file + " would be written twice, expected another name");
     }
 }
 
-std::vector<Path> files_of(const Frames& frames) {
-    std::set<Path> files;
+std::vector<std::string> files_of(const Frames& frames) {
+    std::set<std::string> files, folders;
+    const auto add = [&](const Path& file) {
+        if (files.insert(file.string()).second) folders.insert(folder_of(file).string());
+    };
     for (int index = 0; index < frames.size(); ++index) {
-        files.insert(frames.references->file(index));
-        files.insert(frames.sources->file(index));
-        for (const Path& file : frames.depth->files(index)) files.insert(file);
+        add(frames.references->file(index));
+        add(frames.sources->file(index));
+        for (const Path& file : frames.depth->files(index)) add(file);
     }
     // Tables of times are read from the folders of images.
-    std::set<Path> folders;
-    for (const Path& file : files) folders.insert(folder_of(file));
-    for (const Path& folder : folders)
-        for (const char* table : {"timestamps.csv", "timestamps.txt"}) files.insert(folder / table);
+    for (const std::string& folder : folders)
+        for (const char* table : {"timestamps.csv", "timestamps.txt"})
+            files.insert((Path(folder) / table).string());
     return {files.begin(), files.end()};
 }
 
 void check_writes(const std::vector<Path>& files, const Frames& frames,
-                  std::vector<Path> other_reads) {
-    for (const Path& file : files) check_file_writable(file);
-    const std::vector<Path> reads = files_of(frames);
-    other_reads.insert(other_reads.end(), reads.begin(), reads.end());
-    check_apart(other_reads, {files, {}});
+                  const std::vector<Path>& other_reads) {
+    std::vector<std::string> names;
+    for (const Path& file : files) {
+        check_file_writable(file);
+        names.push_back(file.string());
+    }
+    std::vector<std::string> reads = files_of(frames);
+    for (const Path& file : other_reads) reads.push_back(file.string());
+    check_apart(reads, {names, {}});
 }
 
 }  // namespace xcalib

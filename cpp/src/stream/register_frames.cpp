@@ -58,19 +58,6 @@ std::vector<int> frames_needed(const Frames& frames, const std::vector<bool>& mi
     return needed;
 }
 
-// The rig at the size of the images, which the first frame that can be decoded tells.
-Rig fitted_to_images(const Rig& rig, const Frames& frames) {
-    for (int i = 0;; ++i) {
-        try {
-            const ImageView reference = (*frames.references)[i].view;
-            const ImageView source = (*frames.sources)[i].view;
-            return fitted(rig, reference.width, reference.height, source.width, source.height);
-        } catch (const DecodeError&) {
-            if (i + 1 == frames.size()) throw;
-        }
-    }
-}
-
 long not_finite_pixels(const ImageView& image) {
     if (image.type != PixelType::f32) return 0;
     constexpr std::uint32_t kExponent = 0x7f800000;  // all ones: infinite, or not a number
@@ -88,6 +75,30 @@ long not_finite_pixels(const ImageView& image) {
         }
     }
     return count;
+}
+
+// Nothing that is read is written to.
+void check_over_inputs(const Frames& frames, const std::vector<std::filesystem::path>& other_reads,
+                       const std::filesystem::path& output, const std::vector<FrameName>& names,
+                       bool overlays) {
+    std::vector<std::string> reads = files_of(frames);
+    for (const std::filesystem::path& file : other_reads) reads.push_back(file.string());
+    Writes writes{output_files(output, names, overlays), output_folders(output, overlays)};
+    writes.files.push_back(journal_of(output).string());
+    check_apart(reads, writes);
+}
+
+// The rig at the size of the images, which the first frame that can be decoded tells.
+Rig fitted_to_images(const Rig& rig, const Frames& frames) {
+    for (int i = 0;; ++i) {
+        try {
+            const ImageView reference = (*frames.references)[i].view;
+            const ImageView source = (*frames.sources)[i].view;
+            return fitted(rig, reference.width, reference.height, source.width, source.height);
+        } catch (const DecodeError&) {
+            if (i + 1 == frames.size()) throw;
+        }
+    }
 }
 
 // A frame on its way; what no later stage needs is let go.
@@ -144,9 +155,9 @@ Registered registered(const Registrar& registrar, const Picture& reference, cons
 }
 
 std::vector<FrameName> frame_names(const Frames& frames) {
-    std::map<std::filesystem::path, std::string> stamps;
+    std::map<std::string, std::string> stamps;
     const auto stamp = [&stamps](const std::filesystem::path& file) {
-        std::string& text = stamps[file];
+        std::string& text = stamps[file.string()];
         if (text.empty())
             for (const std::string& part : file_stamp(file)) text += "\n" + part;
         return text;
@@ -178,17 +189,13 @@ BegunRegistration::BegunRegistration(const Frames& frames, const Rig& rig,
                                      Codecs& codecs) {
     check_output_writable(output);
     names = frame_names(frames);
-    const std::vector<std::filesystem::path> files = output_files(output, names, options.overlays);
-    std::vector<std::filesystem::path> reads = files_of(frames);
-    reads.insert(reads.end(), other_reads.begin(), other_reads.end());
-    Writes writes{files, output_folders(output, options.overlays)};
-    writes.files.push_back(journal_of(output));
-    check_apart(reads, writes);
+    check_over_inputs(frames, other_reads, output, names, options.overlays);
     check_alone(output);
     sized = fitted_to_images(rig, frames);
     made_with = made_with_of(rig, output, options, command, inputs, codecs);
     journal = std::make_unique<Journal>(journal_of(output), made_with, options.overwrite);
-    if (journal->is_new() && !options.overwrite) check_not_others(output, files);
+    if (journal->is_new() && !options.overwrite)
+        check_not_others(output, output_files(output, names, options.overlays));
     const double rate = options.rate > 0 ? options.rate : frame_rate(*frames.references);
     sink = open_sink(output, rate, journal.get(), codecs, options.part_frames);
     there = sink->begin(names);

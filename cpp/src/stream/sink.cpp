@@ -366,19 +366,20 @@ void check_video_image(const Path& target, const ImageView& image) {
                          "; a video holds even sizes, a folder any");
 }
 
-std::vector<Path> output_files(const Path& output, const std::vector<FrameName>& frames,
-                               bool overlays) {
-    std::vector<Path> files;
+std::vector<std::string> output_files(const Path& output, const std::vector<FrameName>& frames,
+                                      bool overlays) {
+    std::vector<std::string> files;
     if (is_video_output(output)) {
-        files = {output, of_video(output, ".masks.mkv")};
-        if (overlays) files.push_back(of_video(output, ".overlay" + output.extension().string()));
+        files = {output.string(), of_video(output, ".masks.mkv").string()};
+        if (overlays)
+            files.push_back(of_video(output, ".overlay" + output.extension().string()).string());
         return files;
     }
+    const std::string folder = (output / "").string();
     for (const FrameName& frame : frames) {
-        for (const char* suffix : {".png", ".tiff"})
-            files.push_back(output / (frame.name + suffix));
-        files.push_back(output / "masks" / (frame.name + ".png"));
-        if (overlays) files.push_back(output / "overlays" / (frame.name + ".png"));
+        for (const char* suffix : {".png", ".tiff"}) files.push_back(folder + frame.name + suffix);
+        files.push_back(folder + "masks/" + frame.name + ".png");
+        if (overlays) files.push_back(folder + "overlays/" + frame.name + ".png");
     }
     return files;
 }
@@ -390,11 +391,11 @@ std::vector<Path> output_folders(const Path& output, bool overlays) {
     return folders;
 }
 
-void check_not_others(const Path& output, const std::vector<Path>& files) {
+void check_not_others(const Path& output, const std::vector<std::string>& files) {
     std::error_code none;
-    for (const Path& file : files)
+    for (const std::string& file : files)
         if (fs::exists(fs::symlink_status(file, none)))
-            throw InputError(file.string() + " is there, and " + journal_of(output).string() +
+            throw InputError(file + " is there, and " + journal_of(output).string() +
                              " does not say that a run made it; expected another output, or"
                              " --overwrite");
 }

@@ -27,7 +27,7 @@ from ..registration import PART_FRAMES, RegistrationOptions, described, is_word,
 from ..remote import is_url
 from .engine import Lost, run_shards
 from .manifest import JournalManifest, Manifest, ObjectManifest, begun
-from .register_shard import RegisterJob, RegisterShard
+from .register_shard import RegisterJob, RegisterShard, open_straight
 from .shard import Outcome, Shard
 from .target import LocalTarget, target_of
 from .terminated import terminated_is_interrupted
@@ -36,6 +36,8 @@ from .workers import InThisProcess, Workers, WorkersGone, threads_of
 
 LEAST_FRAMES = 16
 """Of a shard, so that what it costs to send it is nothing beside what it does."""
+MANY_SLOTS = 100
+"""Beyond which shards grow with the workers: a scheduler takes a few hundred shards a second."""
 SHARDS_A_SLOT = 8
 """At least so many, so that no worker waits long for the last one."""
 
@@ -164,12 +166,13 @@ class Drive:
         frames: Frames | None = None,
         made_of: Mapping[str, Any] | None = None,
         other_reads: Sequence[Path] = (),
+        drives: int = 1,
     ) -> None:
         options = options or RegistrationOptions()
         self._options = dataclasses.replace(options, threads=threads_of(workers, options.threads))
         self._start = time.perf_counter()
         self._rig = rig
-        self._frames = frames or Frames.open(inputs, rig)
+        self._frames = frames or open_straight(inputs, rig, options.nearest)
         self._made_of = described(made_of_inputs(inputs) if made_of is None else made_of)
         self._other_reads = list(other_reads)
         self._target = target_of(output)
@@ -202,7 +205,7 @@ class Drive:
         if self._missing and self._frames.depth.is_steady:
             self._ranges = [(0, len(self._names))]  # each depends on those before it
         elif self._missing:
-            size = shard_frames or shard_size(len(self._missing), workers.slots)
+            size = shard_frames or shard_size(len(self._missing), workers.slots, drives)
             self._ranges = ranges_of(self._missing, size)
         self._job = RegisterJob(
             fingerprint("\n".join((str(ledger.made_with), *(k for k, _ in self._names)))),
@@ -314,11 +317,13 @@ def made_of_inputs(inputs: Inputs) -> dict[str, Any]:
     return fields
 
 
-def shard_size(frames: int, slots: int) -> int:
+def shard_size(frames: int, slots: int, drives: int = 1) -> int:
     """Frames of a shard: few enough that all workers end together, and that what is lost with one
-    is little.
+    is little; enough that the scheduler keeps up, however many workers there are.
     """
-    return min(max(-(-frames // (SHARDS_A_SLOT * max(slots, 1))), LEAST_FRAMES), PART_FRAMES)
+    most = PART_FRAMES * max(1, slots // MANY_SLOTS)
+    ours = max(slots // drives, 1)
+    return min(max(-(-frames // (SHARDS_A_SLOT * ours)), LEAST_FRAMES), most)
 
 
 def ranges_of(indices: Sequence[int], most: int) -> list[tuple[int, int]]:

@@ -43,11 +43,14 @@ class RegisterJob:
 
     def frames(self) -> Frames:
         """The footage, opened once in a worker."""
-        inputs, rig, nearest = self.inputs, self.rig, self.options.nearest
         return opened_once(
-            self.id,
-            lambda: Frames.open(inputs, rig).with_straight_rows(*inputs.readout, rig, nearest),
+            self.id, lambda: open_straight(self.inputs, self.rig, self.options.nearest)
         )
+
+
+def open_straight(inputs: Inputs, rig: Rig, nearest: bool) -> Frames:
+    """The frames with their sources straightened by the readouts among the inputs."""
+    return Frames.open(inputs, rig).with_straight_rows(*inputs.readout, rig, nearest)
 
 
 @dataclass(frozen=True)

@@ -226,6 +226,7 @@ class Batch:
             self._workers,
             made_of=inputs,
             other_reads=[local(state.rig)],
+            drives=len(self.states),
         )
         state.drive = drive
         self._by_output[drive.output] = state

@@ -33,6 +33,10 @@ class Run:
 def load_document(path: Path) -> tuple[Path, dict[str, Any]]:
     """The report of a file, or of a folder that has one, and the file."""
     file = path / FILE if path.is_dir() else path
+    if file.suffix.lower() == ".html":
+        raise InputError(
+            f"{file}: a page already, expected the report that `calibrate --report FILE.json` wrote"
+        )
     if path.is_dir() and not file.is_file():
         raise InputError(f"{path}: a folder without {FILE}, expected one that `xcalib demo` wrote")
     try:

@@ -98,17 +98,15 @@ inline constexpr int kPartFrames = 250;
 inline constexpr int kBatchFrames = 32;
 
 // The files of an output, of frames of these names: those that a run may write to.
-std::vector<std::filesystem::path> output_files(const std::filesystem::path& output,
-                                                const std::vector<FrameName>& frames,
-                                                bool overlays);
+std::vector<std::string> output_files(const std::filesystem::path& output,
+                                      const std::vector<FrameName>& frames, bool overlays);
 // The folders that are filled with images; none of a video.
 std::vector<std::filesystem::path> output_folders(const std::filesystem::path& output,
                                                   bool overlays);
 
 // Throws InputError where one of these files is there though the journal of the output is new:
 // others have made it.
-void check_not_others(const std::filesystem::path& output,
-                      const std::vector<std::filesystem::path>& files);
+void check_not_others(const std::filesystem::path& output, const std::vector<std::string>& files);
 // Throws InputError where another video's run has a file beside it that this one's has too: o.mp4
 // and o.avi both have o.masks.mkv.
 void check_alone(const std::filesystem::path& output);
