@@ -217,7 +217,7 @@ Rig any_rig(std::mt19937& random, int width, int height, int source_width, int s
 // Side by side, from a source that is coarser than the reference to one four times as fine.
 template <class T>
 void expect_usual_paths_agree(unsigned seed, const Lens& source_lens = {},
-                              const Lens& reference_lens = {}) {
+                              const Lens& reference_lens = {}, int channels = 1) {
     on_every_target([&] {
         std::mt19937 random(seed);
         for (const int source_width : {64, 90, 150, 210, 400, 800}) {
@@ -229,7 +229,7 @@ void expect_usual_paths_agree(unsigned seed, const Lens& source_lens = {},
             rig = turned(rig, {0.01, -0.01, 0.02});
             rig.source.lens = source_lens;
             rig.reference.lens = reference_lens;
-            const auto source = random_frame<T>(random, source_width, source_height, 1);
+            const auto source = random_frame<T>(random, source_width, source_height, channels);
             std::vector<float> depth(std::size_t(width) * height);
             for (int i = 0; i < width * height; ++i)  // a slope, and things before it
                 depth[i] = i % width % 50 < 20 ? 3.0f : 8.0f + 0.1f * static_cast<float>(i / width);
@@ -240,6 +240,9 @@ void expect_usual_paths_agree(unsigned seed, const Lens& source_lens = {},
 }
 
 TEST(RegisterPaths, AgreeOnUsualBytes) { expect_usual_paths_agree<std::uint8_t>(11); }
+TEST(RegisterPaths, AgreeOnUsualBytesInColour) {
+    expect_usual_paths_agree<std::uint8_t>(18, {}, {}, 3);
+}
 TEST(RegisterPaths, AgreeOnUsual16Bits) { expect_usual_paths_agree<std::uint16_t>(12); }
 TEST(RegisterPaths, AgreeOnUsualFloats) { expect_usual_paths_agree<float>(13); }
 
@@ -251,6 +254,7 @@ TEST(RegisterPaths, AgreeOnUsualBytesThroughLenses) {
     expect_usual_paths_agree<std::uint8_t>(11, kBrown);
     expect_usual_paths_agree<std::uint8_t>(12, kRational, kBrown);
     expect_usual_paths_agree<std::uint8_t>(13, {}, kFisheye);
+    expect_usual_paths_agree<std::uint8_t>(19, kBrown, {}, 3);
 }
 TEST(RegisterPaths, AgreeOnUsual16BitsThroughLenses) {
     expect_usual_paths_agree<std::uint16_t>(14, kRational);

@@ -50,23 +50,28 @@ fs::path absolute_path(const fs::path& path) {
 }
 
 std::vector<std::string> file_stamp(const fs::path& path) {
-    std::error_code error;
-    std::vector<fs::path> files{path};
-    if (fs::is_directory(path, error)) {
-        files.clear();
-        for (fs::directory_iterator entry(path, error), end; !error && entry != end;
-             entry.increment(error))
-            files.push_back(entry->path());
-        std::sort(files.begin(), files.end());
-    }
     std::vector<std::string> stamp{absolute_path(path).string()};
-    for (const fs::path& file : files) {
-        struct stat about {};
-        // The standard library's clock of files has an epoch of its own.
-        if (error || stat(file.c_str(), &about) != 0) return {path.string()};
+    // The standard library's clock of files has an epoch of its own.
+    struct stat about {};
+    const auto add = [&](const fs::path& file) {
         stamp.push_back(format(
             "%s %jd %jd.%09ld", file.filename().c_str(), static_cast<std::intmax_t>(about.st_size),
             static_cast<std::intmax_t>(about.st_mtim.tv_sec), about.st_mtim.tv_nsec));
+    };
+    if (stat(path.c_str(), &about) != 0) return {path.string()};
+    if (!S_ISDIR(about.st_mode)) {
+        add(path);
+        return stamp;
+    }
+    std::error_code error;
+    std::vector<fs::path> files;
+    for (fs::directory_iterator entry(path, error), end; !error && entry != end;
+         entry.increment(error))
+        files.push_back(entry->path());
+    std::sort(files.begin(), files.end());
+    for (const fs::path& file : files) {
+        if (error || stat(file.c_str(), &about) != 0) return {path.string()};
+        add(file);
     }
     return stamp;
 }

@@ -10,6 +10,7 @@
 #include <hwy/cache_control.h>
 
 #include <cstring>
+#include <type_traits>
 
 #include "geometry/projector-inl.hpp"
 #include "register/register_rows.hpp"
@@ -34,12 +35,23 @@ HWY_INLINE int first_of(Vectors vectors) {
 
 // A bit for each lane.
 HWY_INLINE Vectors bits(Mask mask) {
-    std::uint8_t bytes[8] = {};
+    // As many bytes are read as were written: a processor waits for others.
+    std::uint8_t bytes[8];
+    std::conditional_t<(kLanes > 8), std::uint16_t, std::uint8_t> out;
     hn::StoreMaskBits(FloatTag(), mask, bytes);
-    Vectors out;
     std::memcpy(&out, bytes, sizeof out);
     return out;
 }
+
+HWY_INLINE float greatest(Float of) { return hn::GetLane(hn::MaxOfLanes(FloatTag(), of)); }
+
+// Where the points of a row lie in the source, in the units of Row and shifted as it is, so that
+// rounding cuts down to a whole number; u is NaN where there is none. And 1/z. By pixels.
+struct RowPoints {
+    float *u, *v, *inverse_z;
+
+    HWY_INLINE RowPoints from(int x) const { return {u + x, v + x, inverse_z + x}; }
+};
 
 // A number plus kLarge is rounded to a whole one, of which the bits less kLargeBits are the
 // integer. Holds up to 4 million, and is cheaper than a conversion, which has to look out for

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <mutex>
 #include <sstream>
@@ -31,32 +30,6 @@ void require_size(const char* name, int width, int height, const Pinhole& camera
     message << name << " is " << width << "x" << height << ", expected the rig's " << camera.width
             << "x" << camera.height;
     throw std::invalid_argument(message.str());
-}
-
-// Where the source has no number, or is made of one that is none, it has no value: as outside of
-// it.
-void drop_not_finite(const MutableImageView& image, int begin, int end, std::uint8_t* mask) {
-    constexpr std::uint32_t kExponent = 0x7f800000;  // all of its bits: infinite, or not a number
-    const int values = image.width * image.channels;
-    const auto is_finite = [](float value) {
-        std::uint32_t bits;
-        std::memcpy(&bits, &value, sizeof bits);
-        return (bits & kExponent) != kExponent;
-    };
-    for (int y = begin; y < end; ++y) {
-        auto* row = reinterpret_cast<float*>(static_cast<char*>(image.data) + y * image.row_bytes);
-        int bad = 0;
-        for (int i = 0; i < values; ++i) bad |= !is_finite(row[i]);
-        if (!bad) continue;
-        std::uint8_t* codes = mask + static_cast<std::size_t>(y) * image.width;
-        for (int x = 0; x < image.width; ++x) {
-            float* pixel = row + x * image.channels;
-            if (std::all_of(pixel, pixel + image.channels, is_finite)) continue;
-            std::fill_n(pixel, image.channels, 0.0f);
-            if (codes[x] == static_cast<std::uint8_t>(Validity::valid))
-                codes[x] = static_cast<std::uint8_t>(Validity::outside);
-        }
-    }
 }
 
 }  // namespace
@@ -237,7 +210,6 @@ void Registrar::register_frame(const ImageView& source, const ImageView& depth,
     const DepthView given = checked(depth, options().depth_scale, rig().reference);
     stream_->each_row(task, given, true, [&](const RowsTask& part, int begin, int end) {
         register_rows(part, begin, end);
-        if (source.type == PixelType::f32) drop_not_finite(registered, begin, end, mask);
     });
 }
 

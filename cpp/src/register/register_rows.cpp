@@ -1,7 +1,9 @@
 #include "register/register_rows.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <type_traits>
 
 #define HWY_WANT_AVX3_DL  // which Highway leaves out unless asked
 #include "base/kernel_targets.hpp"
@@ -17,6 +19,28 @@ HWY_BEFORE_NAMESPACE();
 namespace xcalib {
 namespace HWY_NAMESPACE {
 namespace {
+
+// Where a pixel is made of what is no number, it has no value: as outside of the source.
+void drop_not_finite(float* row, int width, int channels, std::uint8_t* mask) {
+    const auto is_finite = [](float value) { return std::isfinite(value); };
+    for (int x = 0; x < width; ++x) {
+        float* pixel = row + x * channels;
+        if (std::all_of(pixel, pixel + channels, is_finite)) continue;
+        std::fill_n(pixel, channels, 0.0f);
+        if (mask[x] == static_cast<std::uint8_t>(Validity::valid))
+            mask[x] = static_cast<std::uint8_t>(Validity::outside);
+    }
+}
+
+HWY_INLINE bool all_finite(const float* values, int count) {
+    const FloatTag d;
+    Float not_zero = hn::Zero(d);  // what is not finite less itself is no number
+    for (int i = 0; i < count; i += kLanes) {
+        const Float some = load(values + i, count - i);
+        not_zero = hn::Or(not_zero, hn::Sub(some, some));
+    }
+    return hn::AllTrue(d, hn::Eq(not_zero, hn::Zero(d)));
+}
 
 // Where the pixels of a row lie that is looked at a vector at a time.
 struct SlowRow {
@@ -35,7 +59,9 @@ struct SlowRow {
     // Of valid ones those that something hides.
     HWY_INLINE Mask gone(int x, const Points& p, Mask valid) const {
         if (task.cells) return hn::And(valid, HWY_NAMESPACE::hidden(*task.grid, task.cells, p));
-        if (hidden.may_be_hidden(x)) return hn::And(valid, hidden.hidden(x));
+        const int vector = x / kLanes;
+        if (task.row_grid && (hidden.may_be_hidden(vector) >> vector % kVectors) & 1)
+            return hn::And(valid, hidden.hidden(x));
         return hn::MaskFromVec(hn::Zero(FloatTag()));
     }
 };
@@ -54,12 +80,22 @@ struct RowOrder {
     HWY_INLINE int row(int i) const { return shadows.down ? first + i : first - i; }
 };
 
-// Puts the pixels of a row from x on.
-HWY_INLINE void put(const SlowRow& row, HiddenRow& hidden, int x) {
+// Puts the pixels of a row from x on, in `units` of a pixel. The greatest 1/z of them.
+HWY_INLINE Float put(const SlowRow& row, const HiddenRow& hidden, int x, double units) {
+    const FloatTag d;
+    const Float nowhere = set(std::numeric_limits<double>::quiet_NaN());
+    const RowPoints to = hidden.points();
+    Float nearest = hn::Zero(d);
     for (; x < row.task.depth->width(); x += kLanes) {
         const Points p = row.locate(x).points();
-        hidden.put(x, p, in_front(row.depth(x), p), row.along(x));
+        const Mask somewhere = in_front(row.depth(x), p);
+        const Float u = hn::IfThenElse(somewhere, p.u, nowhere);
+        hn::Store(hn::MulAdd(u, set(units), set(kHalfBack)), d, to.u + x);
+        hn::Store(hn::MulAdd(p.v, set(units), set(kHalfBack)), d, to.v + x);
+        hn::Store(p.inverse_z, d, to.inverse_z + x);
+        nearest = hn::Max(nearest, hn::IfThenElseZero(somewhere, p.inverse_z));
     }
+    return nearest;
 }
 
 // Any vector of pixels.
@@ -93,16 +129,22 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
         const int y = order.row(i);
         const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(*task.depth, y, *task.room);
-        HiddenRow hidden(task, order.shadows, width, order.before + i);
-        const SlowRow slow{task, row, depth, hidden};
-        if (i < 0) {
-            put(slow, hidden, 0);
-            hidden.find();
-            continue;
-        }
         T* out = reinterpret_cast<T*>(static_cast<char*>(task.registered.data) +
                                       y * task.registered.row_bytes);
         std::uint8_t* mask = task.mask + static_cast<std::size_t>(y) * width;
+        int whole = 0;  // up to here all is done by stretches
+        double units = 1;
+#if HWY_TARGET != HWY_SCALAR
+        const UsualRow<T, kChannels> usual(task, source, depth, y, out, mask);
+        if (!task.nearest && i >= 0) {
+            whole = width / kLanes * kLanes;
+            units = usual.units();
+        }
+#endif
+        HiddenRow hidden(task, order.shadows, width, order.before + i, units);
+        const SlowRow slow{task, row, depth, hidden};
+        Float nearest = hn::Zero(FloatTag());
+        if (task.row_grid) nearest = put(slow, hidden, whole, units);
         const auto sample_at = [&](int x) HWY_ATTR {
             const int left = width - x;
             if (left >= kLanes) {
@@ -113,18 +155,14 @@ void register_rows_of(const RowsTask& task, int begin, int end) {
             std::copy_n(pixels, kChannels * left, out + kChannels * x);
             std::copy_n(codes, left, mask + x);
         };
-        int whole = 0;  // up to here all is done by stretches
+        if (whole == 0 && task.row_grid) hidden.find(greatest(nearest));
+        if (i < 0) continue;
 #if HWY_TARGET != HWY_SCALAR
-        if (!task.nearest) whole = width / kLanes * kLanes;
+        if (whole > 0) register_usual(usual, whole, hidden, nearest, sample_at);
 #endif
-        if (task.row_grid) put(slow, hidden, whole);
-#if HWY_TARGET != HWY_SCALAR
-        if (whole > 0)
-            register_usual(UsualRow<T, kChannels>(task, source, depth, y, out, mask), whole, hidden,
-                           sample_at);
-#endif
-        if (whole == 0 && task.row_grid) hidden.find();
         for (int x = whole; x < width; x += kLanes) sample_at(x);
+        if constexpr (std::is_same_v<T, float>)  // while the row is near
+            if (!all_finite(out, width * kChannels)) drop_not_finite(out, width, kChannels, mask);
     }
 }
 
@@ -152,12 +190,9 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
         const AnyRow row(*task.projector, y, kHalfBack);
         const DepthRow depth(*task.depth, y, *task.room);
         float* out = map + 2 * static_cast<std::size_t>(y) * width;
-        HiddenRow hidden(task, order.shadows, width, order.before + i);
+        HiddenRow hidden(task, order.shadows, width, order.before + i, 1);
         const SlowRow slow{task, row, depth, hidden};
-        if (task.row_grid) {
-            put(slow, hidden, 0);
-            hidden.find();
-        }
+        if (task.row_grid) hidden.find(greatest(put(slow, hidden, 0, 1)));
         if (i < 0) continue;
         for (int x = 0; x < width; x += kLanes) {
             HWY_ALIGN float u[kLanes], v[kLanes];
@@ -174,15 +209,6 @@ void map_rows(const RowsTask& task, int begin, int end, float* map) {
     }
 }
 
-int stretches_bytes(int width) {
-#if HWY_TARGET != HWY_SCALAR
-    return static_cast<int>(sizeof(Stretch)) * (width / (kVectors * kLanes) + 1);
-#else
-    (void)width;
-    return 0;
-#endif
-}
-
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace xcalib
@@ -194,20 +220,17 @@ namespace {
 
 HWY_EXPORT(register_rows);
 HWY_EXPORT(map_rows);
-HWY_EXPORT(stretches_bytes);
 
 }  // namespace
 
 void HiddenRoom::keep(int width, const RowGrid& grid) {
     constexpr int kRoom = 128;  // two vectors more, whatever their length
-    constexpr int kRows = RowGrid::kMaxReach + 1;
     stride = (width + kRoom) / 64 * 64;
-    for (auto* row : {&place, &inverse_z, &low, &behind}) row->keep(kRows * stride);
+    for (auto* row : {&place, &inverse_z, &low, &high, &before, &behind}) row->keep(kRows * stride);
     for (auto* row : {&breaks, &written}) row->keep(kRows * stride);
-    for (auto* row : {&high, &before}) row->keep(stride);
+    across.keep(stride);
     passed.keep(stride);
     cells.keep(kRows * grid.room());
-    stretches.keep(HWY_DYNAMIC_DISPATCH(stretches_bytes)(width));
 }
 
 void register_rows(const RowsTask& task, int begin, int end) {

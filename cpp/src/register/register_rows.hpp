@@ -22,15 +22,24 @@ void join_cells(const CellGrid& grid, const Nearness* parts, int count, int begi
 
 // What a thread has of its own to find what is hidden in a row (hidden_row-inl.hpp).
 struct HiddenRoom {
-    int stride = 0;                      // of what is kept of this row and of those before it
-    AlignedRow<float> place, inverse_z;  // by pixels
-    AlignedRow<float> low, behind;       // by vectors
-    AlignedRow<std::uint32_t> breaks, written;  // by blocks of vectors
+    static constexpr int kRows = RowGrid::kMaxReach + 1;
+    struct ToCells {
+        float per_unit, shift;
+    };
+    // Of this row, and of those before it that shadows may fall from.
+    int stride = 0;
+    AlignedRow<float> place, inverse_z;           // by pixels
+    AlignedRow<float> low, high, before, behind;  // by vectors
+    AlignedRow<std::uint32_t> breaks, written;    // a bit for each vector
     AlignedRow<Nearness> cells;
-    float nearest[RowGrid::kMaxReach + 1] = {};
-    AlignedRow<float> high, before;  // of this row alone, by vectors
+    // By rows in turn: where what is kept of one stands, and the greatest 1/z.
+    int slots[kRows] = {};
+    float nearest[kRows] = {};
+    ToCells to_cells[kRows] = {};
+    bool any_written[kRows] = {};
+    // Of this row alone.
+    AlignedRow<float> across;  // by pixels
     AlignedRow<std::uint32_t> passed;
-    AlignedRow<char> stretches;  // a row of what is located
 
     void keep(int width, const RowGrid& grid);
 };

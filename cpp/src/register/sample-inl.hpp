@@ -119,6 +119,14 @@ constexpr int window() {
     if (XCALIB_LOOK_UP_16 && sizeof(T) == 2) return 32;
     return (sizeof(T) == 1 ? 16 : kLanes) * (reach == Reach::two ? 2 : 1);
 }
+// Where a register holds many pixels, the right neighbours are looked up in the same one, so that
+// half as much is loaded: the last pixel of a window has none.
+template <class T>
+constexpr bool looks_up_both = kLanes >= 16 && sizeof(T) == 4;
+template <class T, Reach reach>
+constexpr int usable() {
+    return window<T, reach>() - (looks_up_both<T> ? 1 : 0);
+}
 // So many pixels of a window lie before the first of a vector's points.
 template <class T, Reach reach>
 constexpr int kBefore = window<T, reach>() / 8;
@@ -138,15 +146,16 @@ HWY_INLINE Int look_up(Int low, Int high, Int index) {
 
 template <Reach reach>
 HWY_INLINE Pair pair_in_window(const float* row, Int index) {
-    const FloatTag d;
-    const auto load = [](const float* from)
-                          HWY_ATTR { return hn::BitCast(IntTag(), hn::LoadU(FloatTag(), from)); };
-    if constexpr (reach == Reach::one)
-        return {hn::BitCast(d, look_up(load(row), index)),
-                hn::BitCast(d, look_up(load(row + 1), index))};
-    else
-        return {hn::BitCast(d, look_up(load(row), load(row + kLanes), index)),
-                hn::BitCast(d, look_up(load(row + 1), load(row + 1 + kLanes), index))};
+    const auto found = [](const float* from, Int at) HWY_ATTR {
+        const auto part = [from](int i) HWY_ATTR {
+            return hn::BitCast(IntTag(), hn::LoadU(FloatTag(), from + i * kLanes));
+        };
+        if constexpr (reach == Reach::one) return hn::BitCast(FloatTag(), look_up(part(0), at));
+        else return hn::BitCast(FloatTag(), look_up(part(0), part(1), at));
+    };
+    if constexpr (looks_up_both<float>)
+        return {found(row, index), found(row, hn::Add(index, set(1)))};
+    else return {found(row, index), found(row + 1, index)};
 }
 
 template <Reach reach>
@@ -327,10 +336,21 @@ HWY_INLINE void interpolate_anywhere(const Source& source, Int x, Int y, Float a
 template <class T>
 HWY_INLINE Reach reach_of(const Source& source, double step) {
     const double needed = (kLanes - 1) * step + 1.5;
-    constexpr int kOne = window<T, Reach::one>(), kTwo = window<T, Reach::two>();
-    if (needed + kBefore<T, Reach::one> < kOne && source.width > kOne) return Reach::one;
-    if (needed + kBefore<T, Reach::two> < kTwo && source.width > kTwo) return Reach::two;
+    const auto serves = [&](int before, int pixels, int all) {
+        return needed + before < pixels && source.width > all;
+    };
+    constexpr Reach one = Reach::one, two = Reach::two;
+    if (serves(kBefore<T, one>, usable<T, one>(), window<T, one>())) return one;
+    if (serves(kBefore<T, two>, usable<T, two>(), window<T, two>())) return two;
     return Reach::none;
+}
+
+// Not 0 where there is no pixel at `index` of a window, or no right neighbour of it.
+template <class T, Reach reach>
+HWY_INLINE Int beyond_window(Int index) {
+    constexpr int kLast = window<T, reach>() - 1;
+    if constexpr (!looks_up_both<T>) return hn::AndNot(set(kLast), index);
+    else return hn::AndNot(set(kLast), hn::Or(index, hn::Add(index, set(1))));
 }
 
 // In a window that begins at this byte of the source, of points whose left pixels are at `index`.

@@ -109,14 +109,20 @@ void check_output_writable(const Path& output) {
 void check_apart(const std::vector<std::string>& reads, const Writes& writes) {
     std::map<Identity, std::string> read;
     std::set<Identity> image_folders;
-    const auto add = [&](const Path& file) {
-        if (const auto identity = identity_of(file)) read.emplace(*identity, file.string());
-        if (!is_image(file)) return;
-        if (const auto identity = identity_of(folder_of(file))) image_folders.insert(*identity);
+    std::set<std::string> seen, seen_folders;  // each is asked for once: there may be many
+    const auto add = [&](const Path& file) {   // is it a folder?
+        if (file.empty() || !seen.insert(file.string()).second) return false;
+        struct stat about {};
+        const bool there = stat(file.c_str(), &about) == 0;
+        if (there) read.emplace(Identity{about.st_dev, about.st_ino}, file.string());
+        if (const Path folder = folder_of(file);
+            is_image(file) && seen_folders.insert(folder.string()).second)
+            if (const auto identity = identity_of(folder)) image_folders.insert(*identity);
+        return there && S_ISDIR(about.st_mode);
     };
     for (const std::string& name : reads) {
+        if (!add(name)) continue;
         std::error_code none;
-        if (!name.empty()) add(name);
         for (const fs::directory_entry& entry : fs::directory_iterator(name, none))
             if (entry.is_regular_file(none)) add(entry.path());
     }
