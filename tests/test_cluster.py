@@ -16,6 +16,8 @@ import pytest
 
 from cluster import Cluster, open_cluster
 from drive import arguments, contents
+from xcalib.batch.dask import DaskWorkers
+from xcalib.frames import InputError
 
 pytest.importorskip("distributed")
 long = pytest.mark.skipif(not os.environ.get("XCALIB_CLUSTER"), reason="of `make test-cluster`")
@@ -220,6 +222,15 @@ def test_a_driver_that_is_killed(
     frames_noted(tmp_path / "again")
 
 
+def has_older(address: str) -> bool:
+    """Whether a worker of another version is there already."""
+    try:
+        DaskWorkers(address).close()
+    except InputError as error:
+        return "0.0.1" in str(error)
+    return False
+
+
 @long
 def test_workers_that_are_not_ours(
     refused: Callable[..., str],
@@ -234,9 +245,10 @@ def test_workers_that_are_not_ours(
     with open_cluster(folder, workers=0) as cluster:
         given = arguments(drive, tmp_path / "out", "--scheduler", cluster.address)
         assert "it has no worker, expected `dask worker tcp://" in refused(*given)
-        cluster.start_worker()
         cluster.start_worker("--preload", str(older))
-        time.sleep(8)
+        deadline = time.monotonic() + 120
+        while not has_older(cluster.address):
+            assert time.monotonic() < deadline
         line = refused(*given)
         assert re.search(r"worker tcp://127.0.0.1:\d+ has xcalib 0.0.1, expected ", line)
         started = time.monotonic()

@@ -129,13 +129,13 @@ def identity(path: Path) -> Path:
     """What stands for a file of a remote folder where it is asked whether it has changed: a name
     that is no file's, the same on every machine.
     """
-    remote = _known.get(path)
+    remote = _known.get(path) if _known else None
     return path if remote is None else Path(f"{remote.url} {remote.size} {remote.mark}")
 
 
 def shown(path: Path) -> str:
     """A path for messages."""
-    remote = _known.get(path)
+    remote = _known.get(path) if _known else None
     return str(path) if remote is None else remote.url
 
 

@@ -123,7 +123,8 @@ class DaskWorkers(Workers):
             key=f"xcalib-{shard.id}-{uuid.uuid4().hex[:8]}",
             pure=False,
             workers=others or None,
-            allow_other_workers=bool(others) or None,
+            # Strictly: a worker that fails at once is idle, and would steal it back.
+            allow_other_workers=False,
         )
         self._futures[ticket] = future
         future.add_done_callback(lambda ended: self._note(ticket, ended))
