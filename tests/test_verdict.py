@@ -103,9 +103,42 @@ def test_commands_that_use_an_untrusted_rig_say_so(
         first, second = both(*arguments)
         assert first.returncode == 3
         assert first.stderr == second.stderr
-        assert first.stderr.startswith(f"not to be trusted: {refused}: expected error")
-        assert first.stderr.endswith("; turn it\n")
+        *before, last = first.stderr.splitlines()
+        assert last.startswith(f"not to be trusted: {refused}: expected error")
+        assert last.endswith("; turn it")
+        differs = f"warning: {refused} is not to be trusted by its calibration, but is on these"
+        assert [line.startswith(differs) for line in before] == [True] * (
+            arguments[0] == "evaluate"
+        )
     assert len(list((tmp_path / "c").glob("*.png"))) == FRAMES
+
+
+@pytest.fixture(scope="module")
+def stale(calibrated: tuple[Path, Result], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The calibrated rig, as if its source had been turned by 0.5 degrees since."""
+    text = (calibrated[0] / "rig.yaml").read_text()
+    rig = Rig.load(calibrated[0] / "rig.yaml")
+    c, s = np.cos(np.deg2rad(0.5)), np.sin(np.deg2rad(0.5))
+    pan = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    path = tmp_path_factory.mktemp("stale") / "rig.yaml"
+    Rig(rig.reference, rig.source, pan @ rig.R, pan @ rig.t).save(path)
+    turned = path.read_text().replace("version: 1", "version: 2")
+    path.write_text(turned + text[text.index("calibration:") :])
+    return path
+
+
+def test_evaluate_says_where_the_verdict_on_these_frames_differs(
+    both: Callable[..., tuple[Process, Result]],
+    calibrated: tuple[Path, Result],
+    stale: Path,
+    rendered: Path,
+) -> None:
+    for rig, is_stale in ((calibrated[0] / "rig.yaml", False), (stale, True)):
+        for result in both("evaluate", rig, *folders(rendered), "--quiet"):
+            line = next(x for x in result.stdout.splitlines() if x.startswith("on these frames: "))
+            assert ("NOT TRUSTED: these frames have the source" in line) == is_stale, line
+            said = f"warning: {rig} was trusted when it was calibrated, but is not on these frames"
+            assert result.stderr.startswith(said) == is_stale
 
 
 def test_a_tolerance_that_is_not_met_is_named(rendered: Path, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from xcalib._core import (
     DepthUnits,
     depth_unit_of,
     distrust,
-    joined_line,
+    joined_images,
     load_frames,
     pair_files,
     read_times,
@@ -264,22 +264,26 @@ def test_two_images_in_one_frame_are_told() -> None:
     raws = [(scene.astype(np.uint16) * 16 + 17000).astype(np.uint8) for scene in scenes]
     high = [np.vstack(pair) for pair in zip(scenes, raws, strict=True)]
     wide = [np.hstack([scene, scene]) for scene in scenes]
-    line = joined_line(high, "SOURCE")
-    assert line == (
-        "SOURCE's frames, 160x240, look like two images one above the other; expected SOURCE#top or"
-        " SOURCE#bottom"
-    )
-    assert "side by side; expected REFERENCE#left" in joined_line(wide, "REFERENCE")
+    reason, advice = joined_images(high, "SOURCE")
+    assert reason == "SOURCE's frames, 160x240, look like two images one above the other"
+    assert advice == "expected SOURCE#top or SOURCE#bottom"
+    reason_beside, advice_beside = joined_images(wide, "REFERENCE")
+    assert reason_beside.endswith("side by side")
+    assert advice_beside.startswith("expected REFERENCE#left")
     high_scenes = [cv2.resize(scene, (160, 240)) for scene in scenes]
     for whole in (scenes, high_scenes, [np.vstack([s, s[::-1]]) for s in scenes]):
-        assert joined_line(whole, "SOURCE") == ""
+        assert joined_images(whole, "SOURCE") == ("", "")
     options = CalibrationOptions(max_iterations=1, flow="off", num_threads=1)
     options.search.mode = "off"
     metres = [np.full((120, 160), 5, np.float32)] * 3
     result = calibrate(scenes, high, metres, options=options)
-    distrust(line, result)
-    assert not result.converged and result.report.message.startswith(line)
-    assert result.report.verdict.line().startswith(f"{line}; besides: ")
+    before = result.report.message
+    distrust(result, "", "")
+    assert result.report.message == before
+    distrust(result, reason, advice)
+    assert not result.converged
+    assert result.report.message.startswith(f"{reason}; {advice}")
+    assert result.report.verdict.line().startswith(f"{reason}; {advice}; besides: ")
 
 
 # -- Radiometric JPEGs -----------------------------------------------------------------------------

@@ -345,6 +345,7 @@ def test_a_report_is_a_value_too() -> None:
     other = pickle.loads(pickle.dumps(report))
     assert other == report and other.full() == report.full() and other.time == report.time
     assert "\n" not in repr(report) and len(repr(report)) < 2000
+    np.testing.assert_array_equal(other.expected_error_map(5), report.expected_error_map(5))
 
 
 def test_registrars_go_to_other_processes() -> None:

@@ -6,8 +6,11 @@ reference at 640 px of width, over the depths of the footage.
 """
 
 import argparse
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -226,48 +229,51 @@ def cropped(image: np.ndarray) -> np.ndarray:
     return image[y : y + HEIGHT, x : x + WIDTH]
 
 
-@dataclass
-class Tally:
-    """What became of the cases of a kind."""
+SHARES = {"0.68": 0.68, "0.95": 0.95}
 
-    found: list[bool] = field(default_factory=list)
-    trusted: list[bool] = field(default_factory=list)
-    error: list[float] = field(default_factory=list)
-    ratio: list[float] = field(default_factory=list)
-    inside: dict[float, list[float]] = field(default_factory=lambda: {0.68: [], 0.95: []})
 
-    def add(self, case: Case, options: xcalib.CalibrationOptions) -> None:
-        result = xcalib.calibrate(case.references, case.sources, case.depths, options=options)
-        verdict = result.report.verdict
-        self.found.append(verdict.found)
-        self.trusted.append(verdict.trusted)
-        known = np.concatenate([depth[depth > 0] for depth in case.depths])
-        errors, inside = [], {share: [] for share in self.inside}
-        for depth in np.quantile(known, [0.05, 0.25, 0.5, 0.75, 0.95]):
-            error = error_map(result.rig, case, float(depth))
-            errors.append(error)
-            for share, values in inside.items():
-                limit = result.report.expected_error_map(depth, *SHAPE[::-1], share)
-                seen = np.isfinite(limit) & np.isfinite(error)
-                values.append((error <= limit)[seen])
-        self.error.append(float(np.nanmedian(errors)))
-        self.ratio.append(verdict.expected_error.median / self.error[-1])
-        if verdict.found:
-            for share, values in inside.items():
-                self.inside[share].append(float(np.mean(np.concatenate(values))))
+def judged(case: Case, options: xcalib.CalibrationOptions) -> dict[str, Any]:
+    """What became of a case: a record, as JSON has it."""
+    result = xcalib.calibrate(case.references, case.sources, case.depths, options=options)
+    verdict = result.report.verdict
+    known = np.concatenate([depth[depth > 0] for depth in case.depths])
+    errors, inside = [], {share: [] for share in SHARES}
+    for depth in np.quantile(known, [0.05, 0.25, 0.5, 0.75, 0.95]):
+        error = error_map(result.rig, case, float(depth))
+        errors.append(error)
+        for name, share in SHARES.items():
+            limit = result.report.expected_error_map(depth, *SHAPE[::-1], share)
+            seen = np.isfinite(limit) & np.isfinite(error)
+            inside[name].append((error <= limit)[seen])
+    return {
+        "found": verdict.found,
+        "trusted": verdict.trusted,
+        "line": verdict.line(),
+        "error": float(np.nanmedian(errors)),
+        "expected": verdict.expected_error.median,
+        "inside": {name: float(np.mean(np.concatenate(each))) for name, each in inside.items()},
+    }
 
-    def row(self, name: str) -> str:
-        found, trusted = np.array(self.found), np.array(self.trusted)
-        error, ratio = np.array(self.error), np.array(self.ratio)
-        cover = [100 * np.mean(values) if values else np.nan for values in self.inside.values()]
-        near = np.abs(np.log2(ratio[found])) <= 1
-        right = error < 0.5
-        share = 100 * np.mean(near) if found.any() else 0
-        return (
-            f"| {name} | {len(error)} | {np.median(error):.2f} | {found.sum()} | {trusted.sum()} |"
-            f" {(trusted & (error > 2)).sum()} | {(~trusted & right).sum()} of {right.sum()} |"
-            f" {cover[0]:.0f} % | {cover[1]:.0f} % | {share:.0f} % |"
-        )
+
+def row(name: str, records: list[dict[str, Any]]) -> str:
+    found, trusted, error, expected = (
+        np.array([record[key] for record in records])
+        for key in ("found", "trusted", "error", "expected")
+    )
+    cover = [
+        100 * np.mean([r["inside"][share] for r in records if r["found"]])
+        if found.any()
+        else np.nan
+        for share in SHARES
+    ]
+    near = np.abs(np.log2(expected[found] / error[found])) <= 1
+    share = 100 * np.mean(near) if found.any() else np.nan
+    right = error < 0.5
+    return (
+        f"| {name} | {len(error)} | {np.median(error):.2f} | {found.sum()} | {trusted.sum()} |"
+        f" {(trusted & (error > 2)).sum()} | {(~trusted & right).sum()} of {right.sum()} |"
+        f" {cover[0]:.0f} % | {cover[1]:.0f} % | {share:.0f} % |"
+    )
 
 
 SHAPE = (12, 16)
@@ -290,12 +296,13 @@ def error_map(rig: xcalib.Rig, case: Case, depth: float) -> np.ndarray:
     return np.linalg.norm(off, axis=-1) * unit
 
 
-def cases(seeds: range) -> Iterator[tuple[str, Iterator[Case | None]]]:
-    for kind in (*RIGHT, *RIGHT_TOO, *WRONG):
-        yield kind.__name__.replace("_", " "), (street(kind, seed) for seed in seeds)
-    yield "real, on planes", (real(seed, True, 12) for seed in seeds)
-    yield "real, flat", (real(seed, False, 12) for seed in seeds)
-    yield "real, six frames", (real(seed, True, 6) for seed in seeds)
+KINDS = {kind.__name__.replace("_", " "): kind for kind in (*RIGHT, *RIGHT_TOO, *WRONG)}
+# (on planes that are not fronto-parallel, frames)
+REAL = {"real, on planes": (True, 12), "real, flat": (False, 12), "real, six frames": (True, 6)}
+
+
+def made(name: str, seed: int) -> Case | None:
+    return street(KINDS[name], seed) if name in KINDS else real(seed, *REAL[name])
 
 
 def main() -> None:
@@ -303,28 +310,41 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=10, help="of each kind")
     parser.add_argument("--first", type=int, default=200, help="first seed; 100 were for tuning")
     parser.add_argument("--kind", help="only those whose name has this in it")
+    parser.add_argument(
+        "--kept", type=Path, help="file of what is done already, a JSON line a case; added to"
+    )
     args = parser.parse_args()
     print(machine())
+    options = xcalib.CalibrationOptions(num_threads=1)
+    seeds = range(args.first, args.first + args.cases)
+    names = [name for name in (*KINDS, *REAL) if not args.kind or args.kind in name]
+    done: dict[tuple[str, int], dict[str, Any]] = {}
+    if args.kept and args.kept.exists():
+        for line in args.kept.read_text().splitlines():
+            record = json.loads(line)
+            done[record["kind"], record["seed"]] = record
+    for seed in seeds:  # all kinds alike, if it is stopped
+        for name in names:
+            case = None if (name, seed) in done else made(name, seed)
+            if case is None:
+                continue
+            record = {"kind": name, "seed": seed, **judged(case, options)}
+            done[name, seed] = record
+            if args.kept:
+                with args.kept.open("a") as kept:
+                    kept.write(json.dumps(record) + "\n")
     print(
         "| kind | cases | error, median [px] | found | trusted | trusted over 2 px | refused under"
         " 0.5 px | within 68 % | within 95 % | expected within twice |"
     )
-    options = xcalib.CalibrationOptions(num_threads=1)
-    wrong = refused = 0
-    for name, footage in cases(range(args.first, args.first + args.cases)):
-        if args.kind and args.kind not in name:
-            continue
-        tally = Tally()
-        for case in footage:
-            if case is not None:
-                tally.add(case, options)
-        if tally.error:
-            print(tally.row(name), flush=True)
-            error, trusted = np.array(tally.error), np.array(tally.trusted)
-            wrong += int((trusted & (error > 2)).sum())
-            refused += int((~trusted & (error < 0.5)).sum())
-    figure("trusted, over 2 px", wrong)
-    figure("refused, under 0.5 px", refused)
+    for name in names:
+        records = [done[name, seed] for seed in seeds if (name, seed) in done]
+        if records:
+            print(row(name, records))
+    records = [record for (name, seed), record in done.items() if seed in seeds and name in names]
+    figure("cases", len(records))
+    figure("trusted, over 2 px", sum(r["trusted"] and r["error"] > 2 for r in records))
+    figure("refused, under 0.5 px", sum(not r["trusted"] and r["error"] < 0.5 for r in records))
 
 
 if __name__ == "__main__":

@@ -286,8 +286,11 @@ void run(CalibrateArguments a, bool has_report, Console& console) {
         console.line(text.str());
         console.event("plane", {{"horizon", plane.horizon}, {"plane_roll", plane.roll_deg}});
     }
-    distrust(joined_line(loaded.views(&Frame::reference), "REFERENCE"), result);
-    distrust(joined_line(loaded.views(&Frame::source), "SOURCE"), result);
+    for (const auto& [side, name] :
+         {std::pair(&Frame::reference, "REFERENCE"), std::pair(&Frame::source, "SOURCE")}) {
+        const auto [reason, advice] = joined_images(loaded.views(side), name);
+        result.distrust(reason, advice);
+    }
     look_at_lags(frames, loaded, options, initial, console, result, run);
     const Path output(a.output);
     if (output.has_parent_path()) std::filesystem::create_directories(output.parent_path());

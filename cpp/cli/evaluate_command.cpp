@@ -56,8 +56,9 @@ void run(const EvaluateArguments& a, bool has_json, Console& console) {
         files.push_back(frames.references->where(index));
         console.progress("evaluating", static_cast<double>(index + 1) / frames.size());
     }
-    const Evaluation result = evaluator.result();
+    const Evaluation result = evaluator.result(true);
     console.line(result.table());
+    if (result.verdict) console.line(result.verdict_line());
     say_depth(*frames.depth, console);
     const std::string document = evaluation_document(result, a.rig, files);
     if (has_json) write_file(a.json_file, document);
@@ -65,6 +66,7 @@ void run(const EvaluateArguments& a, bool has_json, Console& console) {
     if (result.valid_share == 0)
         throw NotTrusted("no pixel is valid in " + std::to_string(frames.size()) +
                          " frames, nothing could be scored");
+    if (const std::string line = result.difference(rig, a.rig); !line.empty()) console.warn(line);
     require_trusted(rig, a.rig);
 }
 

@@ -20,8 +20,10 @@
 #include "xcalib/search.hpp"
 #include "xcalib/calibration_options.hpp"
 #include "xcalib/verdict.hpp"
+#include "xcalib/error_field.hpp"
 #include "xcalib/calibration_report.hpp"
 #include "xcalib/calibrate.hpp"
+#include "xcalib/verdict_on.hpp"
 
 // What is done with the rig: kept in a file, and used on a stream of frames.
 #include "xcalib/rig_file.hpp"

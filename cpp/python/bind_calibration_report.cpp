@@ -5,6 +5,7 @@
 #include "json.hpp"
 #include "value_class.hpp"
 #include "xcalib/calibrate.hpp"
+#include "xcalib/error_field.hpp"
 
 namespace xcalib {
 namespace {
@@ -94,6 +95,39 @@ void bind_lag_report(py::module_& m) {
         .as_value();
 }
 
+// What expected_error_map() is drawn from, as Python pickles it; None where there is none.
+py::object kept(const ErrorField* errors) {
+    if (!errors) return py::none();
+    std::vector<int> parameters;
+    for (int i = 0; i < errors->parameters.size(); ++i) parameters.push_back(errors->parameters[i]);
+    const Eigen::MatrixXd& covariance = errors->covariance;
+    return py::make_tuple(
+        errors->rig, errors->halves,
+        std::vector<double>{errors->unit, errors->floor, errors->disagreement}, parameters,
+        std::vector<double>(covariance.data(), covariance.data() + covariance.size()),
+        std::vector<double>(errors->step.data(), errors->step.data() + errors->step.size()));
+}
+
+std::shared_ptr<const ErrorField> error_field_of(const py::object& kept) {
+    if (kept.is_none()) return nullptr;
+    const auto state = kept.cast<py::tuple>();
+    auto out = std::make_shared<ErrorField>();
+    out->rig = state[0].cast<Rig>();
+    out->halves = state[1].cast<std::vector<Rig>>();
+    const auto lengths = state[2].cast<std::vector<double>>();
+    out->unit = lengths.at(0), out->floor = lengths.at(1), out->disagreement = lengths.at(2);
+    for (const int parameter : state[3].cast<std::vector<int>>()) out->parameters.add(parameter);
+    const int size = out->parameters.size();
+    const auto covariance = state[4].cast<std::vector<double>>(),
+               step = state[5].cast<std::vector<double>>();
+    if (covariance.size() != static_cast<std::size_t>(size) * size ||
+        step.size() != static_cast<std::size_t>(size))
+        throw py::value_error("CalibrationReport: pickled by another version");
+    out->covariance = Eigen::Map<const Eigen::MatrixXd>(covariance.data(), size, size);
+    out->step = Eigen::Map<const Eigen::VectorXd>(step.data(), size);
+    return out;
+}
+
 }  // namespace
 
 void bind_calibration_report(py::module_& m) {
@@ -102,7 +136,6 @@ void bind_calibration_report(py::module_& m) {
     bind_lens_report(m);
     bind_adam_step(m);
     bind_lag_report(m);
-    // The model behind expected_error_map() is copied with it, but not pickled.
     ValueClass<CalibrationReport>(m, "CalibrationReport", "How a calibration went.")
         .def_readonly("verdict", &CalibrationReport::verdict, "Verdict.")
         .def_readonly("converged", &CalibrationReport::converged, "Is the rig to be trusted?")
@@ -162,6 +195,10 @@ void bind_calibration_report(py::module_& m) {
             "to_dict", [](const CalibrationReport& report) { return object_of(json_of(report)); },
             "Plain lists and numbers, as for JSON.")
         .keep_unseen(&CalibrationReport::time)
+        .keep_as([](const CalibrationReport& report) { return kept(report.errors.get()); },
+                 [](CalibrationReport& report, const py::object& errors) {
+                     report.errors = error_field_of(errors);
+                 })
         .as_value();
 }
 

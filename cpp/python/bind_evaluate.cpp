@@ -51,7 +51,13 @@ void bind_evaluation(py::module_& m) {
                      e.frames.size(), 100 * e.valid_share, e.registered[0], e.unregistered[0],
                      e.registered[1], e.unregistered[1]);
              })
-        .def("table", &Evaluation::table, "The scores as text, one line each.");
+        .def_readonly("verdict", &Evaluation::verdict,
+                      "Verdict of the rig on these frames, or None where it was not asked for, or "
+                      "where no two frames can be judged.")
+        .def("table", &Evaluation::table, "The scores as text, one line each.")
+        .def("verdict_line", &Evaluation::verdict_line, "The verdict on these frames.")
+        .def("difference", &Evaluation::difference, py::arg("rig"), py::arg("rig_file"),
+             "A line where that of the rig's file differs, else ''.");
 }
 
 }  // namespace
@@ -78,7 +84,10 @@ void bind_evaluate(py::module_& m) {
             "Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m]. "
             "given: "
             "the source as another method registers it, of the reference's aspect.")
-        .def("result", &Evaluator::result, "The Evaluation; ValueError without a frame.");
+        .def("result", &Evaluator::result, py::arg("judge") = false,
+             py::call_guard<py::gil_scoped_release>(),
+             "The Evaluation; ValueError without a frame. judge: with the verdict of the rig on a "
+             "dozen of these frames, which takes seconds.");
 }
 
 }  // namespace xcalib

@@ -83,20 +83,22 @@ the share of the frames read.)");
         "offset.");
     m.def(
         "distrust",
-        [](const std::string& line, CalibrationResult& result) { distrust(line, result); },
-        py::arg("line"), py::arg("result"),
-        "The result is not to be trusted, for the reason in the line; an empty one changes "
-        "nothing.");
+        [](CalibrationResult& result, const std::string& reason, const std::string& advice) {
+            result.distrust(reason, advice);
+        },
+        py::arg("result"), py::arg("reason"), py::arg("advice"),
+        "The result is not to be trusted, and why; an empty reason changes nothing.");
     m.def(
-        "joined_line",
+        "joined_images",
         [](const py::object& images, const std::string& name) {
             const HeldList held = list_of("image", images, image_of);
             const py::gil_scoped_release released;
-            return joined_line(held.views, name);
+            return joined_images(held.views, name);
         },
         py::arg("images"), py::arg("name"),
-        "A line where most of the images look like two joined at their middle, one above the other "
-        "or side by side; else ''. name: REFERENCE or SOURCE.");
+        "(what is wrong, what to give instead) where most of the images look like two joined at "
+        "their middle, one above the other or side by side; else two empty ones. name: REFERENCE "
+        "or SOURCE.");
     m.def(
         "frames_later",
         [](const Stream& all_sources, const std::vector<int>& partners, int lag) {

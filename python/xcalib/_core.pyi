@@ -1209,8 +1209,17 @@ class Evaluation:
     @property
     def frames(self) -> list[tuple[dict[str, float], dict[str, float]]]:
         """Registered and unregistered scores of each frame."""
+    @property
+    def verdict(self) -> Verdict | None:
+        """Verdict of the rig on these frames, or None where it was not asked for, or where no two
+        frames can be judged.
+        """
     def table(self) -> str:
         """The scores as text, one line each."""
+    def verdict_line(self) -> str:
+        """The verdict on these frames."""
+    def difference(self, rig: Rig, rig_file: str) -> str:
+        """A line where that of the rig's file differs, else ''."""
 
 class Evaluator:
     """Judges a rig on frames, one by one."""
@@ -1228,8 +1237,10 @@ class Evaluator:
         """Images of one size a camera, as Registrar takes them; depth (h, w) float32 [m]. given:
         the source as another method registers it, of the reference's aspect.
         """
-    def result(self) -> Evaluation:
-        """The Evaluation; ValueError without a frame."""
+    def result(self, judge: bool = False) -> Evaluation:
+        """The Evaluation; ValueError without a frame. judge: with the verdict of the rig on a
+        dozen of these frames, which takes seconds.
+        """
 
 def _option_words() -> dict[str, list[str]]:
     """The words that each option of the command takes."""
@@ -1564,12 +1575,13 @@ def add_lags(
     offset.
     """
 
-def distrust(line: str, result: CalibrationResult) -> None:
-    """The result is not to be trusted, for the reason in the line; an empty one changes nothing."""
+def distrust(result: CalibrationResult, reason: str, advice: str) -> None:
+    """The result is not to be trusted, and why; an empty reason changes nothing."""
 
-def joined_line(images: Iterable[NDArray[Any]], name: str) -> str:
-    """A line where most of the images look like two joined at their middle, one above the other
-    or side by side; else ''. name: REFERENCE or SOURCE.
+def joined_images(images: Iterable[NDArray[Any]], name: str) -> tuple[str, str]:
+    """(what is wrong, what to give instead) where most of the images look like two joined at
+    their middle, one above the other or side by side; else two empty ones. name: REFERENCE or
+    SOURCE.
     """
 
 class ReadoutFit:

@@ -31,6 +31,7 @@ def evaluate(
     width: int = 640,
     num_threads: int = 0,
     given: Iterable[Image] | None = None,
+    judge: bool = False,
 ) -> Evaluation:
     """Judge a rig on frames; they are taken one by one, so streams and iterators will do.
 
@@ -50,6 +51,9 @@ def evaluate(
     given
         The sources as another method registers them, of the reference's aspect: scored beside ours,
         over the same pixels.
+    judge
+        Judge the rig on a dozen of these frames too, as a calibration would: `Evaluation.verdict`.
+        It takes some seconds.
 
     Raises
     ------
@@ -83,4 +87,4 @@ def evaluate(
                     f"{name}: {count} frames, fewer than of the others; expected as many of each"
                 )
         evaluator.add(*frame)
-    return evaluator.result()
+    return evaluator.result(judge)

@@ -25,7 +25,7 @@ from ._core import (
     fit_readout,
     frames_later,
     frames_to_judge_plane,
-    joined_line,
+    joined_images,
     load_frames,
     look_at_lags,
     orientation_line,
@@ -233,7 +233,7 @@ def run_calibration(
         except ValueError as error:
             raise InputError(with_file_name(str(error), frames.references, chosen)) from None
         for images, name in ((references, "REFERENCE"), (sources, "SOURCE")):
-            distrust(joined_line(images, name), result)
+            distrust(result, *joined_images(images, name))
         if frames.all_sources is not None and frames.offset is not None:
             lag = look_at_lags(
                 *(references, sources, depths, [frames.partners[index] for index in chosen]),

@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 
+#include "base/median.hpp"
 #include "calibrate/depth_check.hpp"
 #include "calibrate/error_model.hpp"
 #include "calibrate/halves.hpp"
@@ -57,8 +58,8 @@ TEST(ErrorModel, GrowsWithWhatTheHalvesDisagreeOnAtTheDepthsAtWhichTheyDo) {
                           plan);
     const ErrorModel apart(scene.images, finest(scene), scene.truth, both(scene.truth, moved),
                            plan);
-    EXPECT_NEAR(apart.at(0).median, same.at(0).median, 1e-3);
-    EXPECT_GT(apart.at(0.5).median, 2 * same.at(0.5).median);
+    EXPECT_NEAR(apart.field().at(0).median, same.field().at(0).median, 1e-3);
+    EXPECT_GT(apart.field().at(0.5).median, 2 * same.field().at(0.5).median);
     EXPECT_GT(apart.over_footage().median, same.over_footage().median);
     EXPECT_GT(same.over_footage().p95, same.over_footage().median);
     Halves none;
@@ -72,7 +73,7 @@ TEST(Plausible, NamesWhatNobodyWouldBuild) {
     const Plan plan{CalibrationOptions{}};
     const ErrorModel model(scene.images, finest(scene), scene.truth, both(scene.truth, scene.truth),
                            plan);
-    EXPECT_FALSE(implausible_in(scene.truth, 4, plan, model));
+    EXPECT_FALSE(implausible_in(scene.truth, 4, plan, model.field()));
     const struct {
         void (*spoil)(Rig&);
         const char *reason, *advice;
@@ -92,18 +93,43 @@ TEST(Plausible, NamesWhatNobodyWouldBuild) {
         SCOPED_TRACE(each.reason);
         Rig rig = scene.truth;
         each.spoil(rig);
-        const auto found = implausible_in(rig, 4, plan, model);
+        const auto found = implausible_in(rig, 4, plan, model.field());
         ASSERT_TRUE(found);
         EXPECT_NE(found->reason.find(each.reason), std::string::npos) << found->reason;
         EXPECT_NE(found->advice.find(each.advice), std::string::npos) << found->advice;
     }
 }
 
+// Where the optical axes lie far apart, a wrong focal length of the reference bends the source's
+// pixels: the map is the same, and nothing else tells.
+TEST(Plausible, ForgivesWhatAnotherReferenceWouldMakeOfTheSameMap) {
+    const Scene scene = make_scene(3, 150, 4);
+    const ErrorModel model(scene.images, finest(scene), scene.truth, both(scene.truth, scene.truth),
+                           Plan{CalibrationOptions{}});
+    Rig apart = turned(scene.truth, {0.3, -0.3, 0.0}), beside = scene.truth;
+    apart.source.skew = beside.source.skew = 0.05 * apart.source.fx;
+    CalibrationOptions known;
+    known.reference_camera = scene.truth.reference;
+    const auto skewed = [&](const Rig& rig, const CalibrationOptions& options) {
+        return implausible_in(rig, 4, Plan(options), model.field()).has_value();
+    };
+    EXPECT_FALSE(skewed(apart, {}));
+    EXPECT_TRUE(skewed(apart, known));
+    EXPECT_TRUE(skewed(beside, {}));
+}
+
 TEST(DepthCheck, SeesDepthThatBelongsToAnotherFrameOrToNone) {
     const Plan plan{CalibrationOptions{}};
     Scene scene = make_scene(6, 150, 4);
     scene.truth.source_from_reference.translation.x() = 0.4;
-    const auto checked = [&] { return check_depth(scene.images, scene.truth, plan); };
+    const auto checked = [&] {
+        std::vector<float> depths;
+        for (const Image& depth : scene.images.pyramid.at(8).depths)
+            depths.insert(depths.end(), depth.pixels.begin(), depth.pixels.end());
+        return check_depth(scene.images, scene.truth,
+                           {quantile(depths, 0.05), quantile(depths, 0.5), quantile(depths, 0.95)},
+                           plan);
+    };
     const auto change = [&](const auto& work) {
         for (auto& [factor, level] : scene.images.pyramid) work(level.depths);
     };
@@ -134,10 +160,9 @@ TEST(DepthCheck, SeesDepthThatBelongsToAnotherFrameOrToNone) {
 TEST(DepthCheck, NamesWhatIsWrong) {
     DepthCheck right;
     right.own = right.refitted = 0.5;
-    right.exchanged = right.beside = 0.4;
-    right.none = right.inverse = 0.3;
+    right.exchanged = right.beside = {0.4, -0.2, 0.02};
+    right.none = right.inverse = {0.3, -0.4, 0.02};
     right.exchangeable = true;
-    right.exchange_error = right.beside_error = 0.01;
     right.parallax_px = 10;
     right.relief = 1;
     EXPECT_FALSE(wrong_depth(right));
@@ -147,12 +172,30 @@ TEST(DepthCheck, NamesWhatIsWrong) {
     } cases[] = {
         {[](DepthCheck& check) { check.relief = 0; }, "every depth is the same"},
         {[](DepthCheck& check) { check.one_for_all = true; }, "all frames have the same depth"},
-        {[](DepthCheck& check) { check.inverse = 0.6; }, "inverse depth fits better"},
-        {[](DepthCheck& check) { check.mirrored = 0.6; }, "when they are mirrored"},
-        {[](DepthCheck& check) { check.upside_down = 0.6; }, "when they are turned upside down"},
-        {[](DepthCheck& check) { check.none = 0.6; }, "no depth at all fits better"},
-        {[](DepthCheck& check) { check.exchanged = 0.5; }, "fits as well as each frame's own"},
-        {[](DepthCheck& check) { check.beside = 0.6; }, "the depth of the last frame fits better"},
+        {[](DepthCheck& check) {
+             check.inverse = {0.6, 0.2, 0.02};
+         },
+         "inverse depth fits better"},
+        {[](DepthCheck& check) {
+             check.mirrored = {0.6, 0.2, 0.02};
+         },
+         "when they are mirrored"},
+        {[](DepthCheck& check) {
+             check.upside_down = {0.6, 0.2, 0.02};
+         },
+         "when they are turned upside down"},
+        {[](DepthCheck& check) {
+             check.none = {0.6, 0.2, 0.02};
+         },
+         "no depth at all fits better"},
+        {[](DepthCheck& check) {
+             check.exchanged = {0.5, 0, 0.02};
+         },
+         "fits as well as each frame's own"},
+        {[](DepthCheck& check) {
+             check.beside = {0.6, 0.2, 0.02};
+         },
+         "the depth of the last frame fits better"},
     };
     for (const auto& each : cases) {
         DepthCheck check = right;
@@ -163,11 +206,20 @@ TEST(DepthCheck, NamesWhatIsWrong) {
     }
     // Too little parallax for depth to matter, or one depth for all: nothing is said of it.
     DepthCheck far = right, same = right;
-    far.exchanged = same.exchanged = 0.5;
+    far.exchanged = same.exchanged = {0.5, 0, 0.02};
     far.parallax_px = 0.5;
     same.exchangeable = false;
     EXPECT_FALSE(wrong_depth(far));
     EXPECT_FALSE(wrong_depth(same));
+    // Two frames, and a gain as large as their scatter.
+    DepthCheck chance = right;
+    chance.inverse = {0.6, 0.2, 0.15};
+    EXPECT_FALSE(wrong_depth(chance));
+    // A plane is a guess: that another one fits better is no mistake in the files.
+    DepthCheck plane = right;
+    plane.is_plane = true;
+    plane.inverse = plane.none = plane.upside_down = {0.6, 0.2, 0.02};
+    EXPECT_FALSE(wrong_depth(plane));
 }
 
 // A cross burnt into otherwise different images.

@@ -51,7 +51,7 @@ struct AdamStep {
     double total = 0.0;  // Eq. (total_loss)
 };
 
-class ErrorModel;  // calibrate.hpp: expected_error_map
+struct ErrorField;  // error_field.hpp
 // The fit with the sources some frames later, refitted.
 struct LagFit {
     int lag = 0;         // that a source is later than its own frame [source frames]
@@ -94,7 +94,7 @@ struct CalibrationReport {
     std::vector<LevelReport> levels;
     LensReport lens;
     std::vector<AdamStep> steps;  // of Solver::adam
-    std::shared_ptr<const ErrorModel> errors;
+    std::shared_ptr<const ErrorField> errors;  // that are expected
     // What can slide, and with what, while the footage's pixels move by a tenth of a pixel.
     std::vector<std::string> weak_directions;
     LagReport lag;  // of fit_lags(), where the footage was a sequence

@@ -52,6 +52,9 @@ struct NecFrame {
     float source_mean = 0.0f;       // m of the warped source, held through a level
     float floor = kEdgeFloor;       // in mean magnitudes
     double reference_energy = 0.0;  // sum of |reference|^2
+
+    // Where it is unknown, the reference has no edges any more.
+    void set_depth(Image known);
 };
 
 NecFrame make_nec_frame(const Image& reference, const Image& source, const Image& depth,

@@ -279,6 +279,7 @@ CalibrationResult calibrate_parts(const Parts& parts, const std::vector<ImageVie
 }
 
 void CalibrationResult::distrust(const std::string& reason, const std::string& advice) {
+    if (reason.empty()) return;
     Verdict& verdict = report.verdict;
     const std::string line = reason + (advice.empty() ? "" : "; " + advice);
     // The footage explains what is wrong with the fit, so it comes first.

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <utility>
 #include <vector>
 
 #include "base/format.hpp"
-#include "base/median.hpp"
 #include "base/parallel.hpp"
 #include "calibrate/static_edges.hpp"
 #include "geometry/projector.hpp"
@@ -18,77 +18,26 @@ namespace {
 
 constexpr int kFactor = 2;
 
-// Inverse depths of the footage, some of them [1/m].
-std::vector<double> inverse_depths(const WorkingImages& images) {
-    std::vector<double> values;
-    for (const Image& depth : images.pyramid.at(8).depths)
-        for (const float z : depth.pixels)
-            if (z > 0) values.push_back(1 / z);
-    return values;
-}
-
-// The same images with depths that `change` replaces, at the levels that are looked at.
-template <class Change>
-WorkingImages with_depths(const WorkingImages& images, const Change& change) {
-    WorkingImages out = images;
-    for (const int factor : {kCoarse, kFactor}) change(out.pyramid.at(factor).depths);
-    return out;
-}
-
-template <class Change>
-WorkingImages with_each_depth(const WorkingImages& images, const Change& change) {
-    return with_depths(images, [&](std::vector<Image>& depths) {
-        for (Image& depth : depths)
-            for (float& z : depth.pixels)
-                if (z > 0) z = static_cast<float>(change(z));
-    });
-}
-
-// The same with each map turned by `turn`, over the same pixels: what is unknown, burnt-in text
-// among it, stays where it is, and where the turned map knows nothing the own one does.
-template <class Turn>
-WorkingImages with_turned_depths(const WorkingImages& images, const Turn& turn) {
-    return with_depths(images, [&](std::vector<Image>& depths) {
-        for (Image& depth : depths) {
-            const std::vector<float> own = depth.pixels;
-            turn(depth);
-            for (std::size_t i = 0; i < own.size(); ++i)
-                if (!(own[i] > 0 && depth.pixels[i] > 0)) depth.pixels[i] = own[i];
-        }
-    });
-}
-
-// How well each frame's edges agree with the depth of the one that comes so much later.
-std::vector<double> with_depth_of(const WorkingImages& images, std::size_t later, const Rig& rig,
-                                  int num_threads) {
-    const Level level =
-        make_level(with_depths(images,
-                               [&](std::vector<Image>& depths) {
-                                   std::rotate(depths.begin(),
-                                               depths.begin() + static_cast<std::ptrdiff_t>(later),
-                                               depths.end());
-                               }),
-                   kFactor, rig, num_threads);
-    const Rig at_level = level.rig_at(rig);
-    std::vector<double> values(level.pairs.size());
-    parallel_each(static_cast<int>(values.size()), num_threads,
-                  [&](int i) { values[i] = level.pairs[i]->evaluate(at_level).aligned; });
-    return values;
-}
-
 double mean(const std::vector<double>& values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-// Of the mean of the differences, by their scatter.
-double standard_error(const std::vector<double>& a, const std::vector<double>& b) {
-    const double count = static_cast<double>(a.size()), difference = mean(a) - mean(b);
-    double sum = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        const double off = a[i] - b[i] - difference;
+// What edges gain by other depth, frame by frame. Few frames show little of how they scatter: they
+// are joined by what is usual.
+Rival rival_of(const std::vector<double>& given, const std::vector<double>& other) {
+    constexpr double kUsual = 0.02, kUsualCounts = 3;  // of the agreement; as so many frames
+    const double count = static_cast<double>(given.size()), agreement = mean(given);
+    Rival out;
+    out.agreement = mean(other);
+    if (agreement <= 0) return out;
+    out.gain = (out.agreement - agreement) / agreement;
+    double sum = kUsualCounts * kUsual * kUsual;
+    for (std::size_t i = 0; i < given.size(); ++i) {
+        const double off = (other[i] - given[i]) / agreement - out.gain;
         sum += off * off;
     }
-    return std::sqrt(sum / (count * std::max(1.0, count - 1)));
+    out.error = std::sqrt(sum / (count - 1 + kUsualCounts) / count);
+    return out;
 }
 
 // Inverse depth is linear over a plane: does it bend anywhere else than at an edge or two?
@@ -116,126 +65,220 @@ bool one_depth_for_all(const WorkingImages& images) {
     return depths.size() > 1 && !is_plane(depths[0]) && !camera_stands_still(images);
 }
 
-// How well edges agree after a short fit from the rig, coarse before fine.
-struct Refitted {
-    double coarse = 0, fine = 0;
+// How well each frame's edges agree.
+std::vector<double> agreement_of(const Level& level, const Rig& rig, int num_threads) {
+    const Rig at_level = level.rig_at(rig);
+    std::vector<double> values(level.pairs.size());
+    parallel_each(static_cast<int>(values.size()), num_threads,
+                  [&](int i) { values[i] = level.pairs[i]->evaluate(at_level).aligned; });
+    return values;
+}
+
+// Some frames at the two levels that are looked at.
+struct Levels {
+    Level coarse, fine;
 };
-Refitted refitted(const WorkingImages& images, Rig rig, const Plan& plan, double hopeless) {
+
+// The same after a short fit from the rig, coarse before fine.
+struct Refitted {
+    double coarse = 0;
+    std::vector<double> fine;  // none where coarse edges agree no better than `hopeless`
+};
+Refitted refitted(const Levels& levels, Rig rig, const Plan& plan, double hopeless) {
     constexpr int kIterations = 12;
     Plan quick = plan;
     quick.options.max_iterations = std::min(plan.options.max_iterations, kIterations);
-    const auto solve = [&](int factor) {
-        const Level level = make_level(images, factor, rig, plan.options.num_threads);
+    const auto solve = [&](const Level& level) {
         const double share = pooled(level, rig, plan.options.num_threads).valid_share;
         return solve_level(level, {}, 2, share_limit(share), 1e-4, quick, rig, rig).aligned;
     };
     Refitted out;
-    out.coarse = solve(kCoarse);
-    if (out.coarse > hopeless) out.fine = solve(kFactor);
+    out.coarse = solve(levels.coarse);
+    if (out.coarse <= hopeless) return out;
+    solve(levels.fine);
+    out.fine = agreement_of(levels.fine, rig, plan.options.num_threads);
     return out;
+}
+
+// Depth maps that are changed one by one.
+template <class Change>
+std::vector<Image> each(const std::vector<Image>& depths, const Change& change) {
+    std::vector<Image> out = depths;
+    for (Image& depth : out) change(depth);
+    return out;
+}
+template <class Change>
+std::vector<Image> each_pixel(const std::vector<Image>& depths, const Change& change) {
+    return each(depths, [&](Image& depth) {
+        for (float& z : depth.pixels)
+            if (z > 0) z = static_cast<float>(change(z));
+    });
+}
+
+// Over the same pixels: what is unknown, burnt-in text among it, stays where it is, and where the
+// turned map knows nothing the own one does.
+template <class Turn>
+std::vector<Image> each_turned(const std::vector<Image>& depths, const Turn& turn) {
+    return each(depths, [&](Image& depth) {
+        const std::vector<float> own = depth.pixels;
+        turn(depth);
+        for (std::size_t i = 0; i < own.size(); ++i)
+            if (!(own[i] > 0 && depth.pixels[i] > 0)) depth.pixels[i] = own[i];
+    });
+}
+
+void mirror(Image& depth) {
+    for (int y = 0; y < depth.height; ++y) std::reverse(depth.row(y), depth.row(y) + depth.width);
+}
+
+void turn_upside_down(Image& depth) {
+    for (int y = 0; y < depth.height / 2; ++y)
+        std::swap_ranges(depth.row(y), depth.row(y) + depth.width, depth.row(depth.height - 1 - y));
+}
+
+// Some frames at the levels that are looked at, prepared once for whatever depth: it is known
+// everywhere, so that each depth is compared where it is known itself.
+struct Prepared {
+    WorkingImages images;
+    std::map<int, Level> levels;
+
+    Prepared(WorkingImages some, const std::vector<int>& factors, double depth, const Rig& rig,
+             int num_threads)
+        : images(std::move(some)) {
+        WorkingImages flat = images;
+        for (const int factor : factors) {
+            for (Image& map : flat.pyramid.at(factor).depths)
+                std::fill(map.pixels.begin(), map.pixels.end(), static_cast<float>(depth));
+            levels[factor] = make_level(flat, factor, rig, num_threads);
+        }
+    }
+    const std::vector<Image>& depths(int factor) const { return images.pyramid.at(factor).depths; }
+    Level with(int factor, const std::vector<Image>& depths) const {
+        return with_depths(levels.at(factor), depths, images);
+    }
+};
+
+// Each frame with the depth of others, at the rig itself. They follow each other: those beside are
+// the ones that depth is most often taken from.
+void exchange(const WorkingImages& images, const Rig& rig, double middle, int num_threads,
+              DepthCheck& out) {
+    constexpr std::size_t kRun = 12;
+    std::vector<std::size_t> following(std::min(images.size(), kRun));
+    std::iota(following.begin(), following.end(), (images.size() - following.size()) / 2);
+    const Prepared run(images.subset(following), {kFactor}, middle, rig, num_threads);
+    const auto later = [&](std::size_t frames) {
+        std::vector<Image> depths = run.depths(kFactor);
+        std::rotate(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(frames),
+                    depths.end());
+        return agreement_of(run.with(kFactor, depths), rig, num_threads);
+    };
+    const std::vector<double> own = later(0), far = later(following.size() / 2);
+    out.own = mean(own);
+    out.exchangeable = far != own;
+    out.exchanged = rival_of(own, far);
+    for (const bool next : {true, false}) {
+        const Rival beside = rival_of(own, later(next ? 1 : following.size() - 1));
+        if (beside.agreement <= out.beside.agreement) continue;
+        out.beside = beside;
+        out.beside_is_next = next;
+    }
 }
 
 }  // namespace
 
-DepthCheck check_depth(const WorkingImages& images, const Rig& rig, const Plan& plan) {
-    constexpr std::size_t kRun = 12, kFrames = 6;
+bool Rival::is_better() const {
+    constexpr double kGain = 0.03, kDeviations = 2.0;
+    return gain - kDeviations * error > 0 && gain > kGain;
+}
+
+bool Rival::is_as_good() const {
+    constexpr double kLoss = 0.03, kDeviations = 1.0;
+    return gain - kDeviations * error > -kLoss;
+}
+
+DepthCheck check_depth(const WorkingImages& images, const Rig& rig, const DepthRange& depths,
+                       const Plan& plan) {
+    constexpr std::size_t kFrames = 6;
     const int num_threads = plan.options.num_threads;
     DepthCheck out;
-    const std::vector<double> inverse = inverse_depths(images);
-    if (inverse.empty()) return out;
-    const double low = quantile(inverse, 0.05), middle = median(inverse),
-                 high = quantile(inverse, 0.95);
-    out.relief = (high - low) / middle;
+    out.relief = depths.middle / depths.near - depths.middle / depths.far;
     const double x = (rig.reference.width - 1) / 2.0, y = (rig.reference.height - 1) / 2.0;
-    out.parallax_px = (transfer(rig, x, y, 1 / high) - transfer(rig, x, y, 1 / low)).norm() /
+    out.parallax_px = (transfer(rig, x, y, depths.near) - transfer(rig, x, y, depths.far)).norm() /
                       rig.source_density().x() * 640 / rig.reference.width;
-
-    // Frames that follow each other: those beside are the ones that depth is most often taken from.
-    std::vector<std::size_t> following(std::min(images.size(), kRun));
-    std::iota(following.begin(), following.end(), (images.size() - following.size()) / 2);
-    const WorkingImages run = images.subset(following);
-    const std::vector<double> own = with_depth_of(run, 0, rig, num_threads),
-                              other = with_depth_of(run, run.size() / 2, rig, num_threads);
-    out.own = mean(own);
-    out.exchanged = mean(other);
-    for (std::size_t i = 0; i < run.size(); ++i) out.exchangeable |= own[i] != other[i];
-    out.exchange_error = standard_error(own, other);
+    out.is_plane = is_plane(images.pyramid.at(kFactor).depths[0]);
     out.one_for_all = one_depth_for_all(images);
-    for (const bool next : {true, false}) {
-        const std::vector<double> beside =
-            with_depth_of(run, next ? 1 : run.size() - 1, rig, num_threads);
-        if (mean(beside) <= out.beside) continue;
-        out.beside = mean(beside);
-        out.beside_error = standard_error(own, beside);
-        out.beside_is_next = next;
-    }
+    exchange(images, rig, depths.middle, num_threads, out);
 
-    const WorkingImages few = images.spread(kFrames);
-    const Refitted given = refitted(few, rig, plan, 0);
-    out.refitted = given.fine;
-    // What coarse edges agree with clearly less, fine ones do too.
-    const double hopeless = 0.95 * given.coarse;
-    const auto fits = [&](const WorkingImages& changed) {
-        return refitted(changed, rig, plan, hopeless).fine;
+    const Prepared few(images.spread(kFrames), {kCoarse, kFactor}, depths.middle, rig, num_threads);
+    const auto fitted = [&](const auto& change, double hopeless) {
+        const auto changed = [&](int factor) {
+            return few.with(factor, change(few.depths(factor)));
+        };
+        return refitted({changed(kCoarse), changed(kFactor)}, rig, plan, hopeless);
     };
-    const auto instead = [&](const auto& change) { return fits(with_each_depth(few, change)); };
-    out.none = instead([&](float) { return 1 / middle; });
-    out.mirrored = fits(with_turned_depths(few, [](Image& depth) {
-        for (int y = 0; y < depth.height; ++y)
-            std::reverse(depth.row(y), depth.row(y) + depth.width);
-    }));
-    out.upside_down = fits(with_turned_depths(few, [](Image& depth) {
-        for (int y = 0; y < depth.height / 2; ++y)
-            std::swap_ranges(depth.row(y), depth.row(y) + depth.width,
-                             depth.row(depth.height - 1 - y));
-    }));
+    const Refitted right = fitted([](const std::vector<Image>& given) { return given; }, 0);
+    if (right.fine.empty()) return out;
+    out.refitted = mean(right.fine);
+    // What coarse edges agree with clearly less, fine ones do too.
+    const auto rival = [&](const auto& change) {
+        const Refitted other = fitted(change, 0.95 * right.coarse);
+        return other.fine.empty() ? Rival() : rival_of(right.fine, other.fine);
+    };
+    const auto by_pixel = [&](const auto& change) {
+        return rival([&](const std::vector<Image>& depths) { return each_pixel(depths, change); });
+    };
+    out.none = by_pixel([&](float) { return depths.middle; });
+    out.mirrored =
+        rival([](const std::vector<Image>& depths) { return each_turned(depths, mirror); });
+    out.upside_down = rival(
+        [](const std::vector<Image>& depths) { return each_turned(depths, turn_upside_down); });
     // Relative depth is an inverse depth of unknown shift: its inverse says nothing.
     if (!plan.options.relative_depth)
-        out.inverse = instead([&](float z) { return 1 / (middle * middle * z); });
+        out.inverse = by_pixel([&](float z) { return depths.middle * depths.middle / z; });
     return out;
 }
 
 std::optional<Objection> wrong_depth(const DepthCheck& check) {
-    // Measured on rendered rigs: depth of other frames, upside down or mirrored loses less than 2 %
-    // to another frame's, right depth 6 % and more, and to its inverse it loses always.
-    constexpr double kRelief = 0.02, kGain = 0.03, kParallax = 1.5;
+    constexpr double kRelief = 0.02;
+    // Where depths move pixels by less, noise hides what a frame's own depth is worth, and that of
+    // another moves them by less than the tolerance.
+    constexpr double kParallax = 3.0;
     if (check.relief < kRelief)
         return Objection{"every depth is the same: the rig holds for things at that distance only",
                          "give the depth of each pixel; see docs/inputs.md for where to get it"};
     if (check.one_for_all)
         return Objection{"all frames have the same depth map, though the camera moves",
                          "give each frame its own depth"};
-    if (check.inverse > (1 + kGain) * check.refitted)
+    if (!check.is_plane && check.inverse.is_better())
         return Objection{
             format("inverse depth fits better than the given depth: edges agree by %.3f, not %.3f",
-                   check.inverse, check.refitted),
+                   check.inverse.agreement, check.refitted),
             "are the depth files disparity? Convert them to metres"};
-    if (check.exchangeable && check.beside - 2 * check.beside_error > (1 + kGain) * check.own)
+    if (check.exchangeable && check.beside.is_better())
         return Objection{
             format("the depth of the %s frame fits better than each frame's own: edges agree by "
                    "%.3f, not %.3f",
-                   check.beside_is_next ? "next" : "last", check.beside, check.own),
+                   check.beside_is_next ? "next" : "last", check.beside.agreement, check.own),
             "is the depth late or early, or one file short?"};
     for (const auto& [turned, how] : {std::pair(check.mirrored, "mirrored"),
                                       std::pair(check.upside_down, "turned upside down")})
-        if (turned > (1 + kGain) * check.refitted)
+        if (!check.is_plane && turned.is_better())
             return Objection{
                 format("the depth maps fit better when they are %s: edges agree by %.3f, not %.3f",
-                       how, turned, check.refitted),
+                       how, turned.agreement, check.refitted),
                 "turn the depth maps as the reference images are"};
-    if (check.none > (1 + kGain) * check.refitted)
+    if (!check.is_plane && check.none.is_better())
         return Objection{
             format(
                 "no depth at all fits better than the given depth: edges agree by %.3f, not %.3f",
-                check.none, check.refitted),
+                check.none.agreement, check.refitted),
             "is it registered to the reference images, and in their order?"};
-    if (check.exchangeable && check.parallax_px > kParallax &&
-        check.own - check.exchanged + check.exchange_error < kGain * check.own)
+    if (check.exchangeable && check.parallax_px > kParallax && check.exchanged.is_as_good())
         return Objection{
             format(
                 "the depth of other frames fits as well as each frame's own: edges agree by %.3f, "
                 "with their own by %.3f",
-                check.exchanged, check.own),
+                check.exchanged.agreement, check.own),
             "do depth and images belong together: same frame, same way up, not mirrored?"};
     return std::nullopt;
 }

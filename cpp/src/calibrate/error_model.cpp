@@ -3,15 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <stdexcept>
 
 #include "base/format.hpp"
 #include "base/parallel.hpp"
-#include "geometry/projector.hpp"
-#include "objective/projection_derivative.hpp"
 #include "solve/solve.hpp"
-#include "xcalib/calibrate.hpp"
 
 namespace xcalib {
 namespace {
@@ -20,15 +15,8 @@ constexpr double kUnitWidth = 640;  // [px] of the reference, in whose pixels er
 
 // A frame tells of some directions only: so much of what all say goes to every direction alike.
 constexpr double kShrinkage = 0.3;
-// Measured on rigs whose truth is known (docs/trust.md), as are those below: weights of the
-// squared errors that the gradients' scatter predicts, that halves which lie apart show, and that
-// the lens would make which was not estimated,
-constexpr double kPredicted = 0.6, kApart = 0.12, kMissed = 1.5;
-// what all frames share and none of these sees [working px],
+// What all frames share and nothing here sees [working px], as measured (see error_field.cpp).
 constexpr double kFloor = 0.02;
-// and the degrees of freedom of the error's distribution, of which the tails are heavier than a
-// Gaussian's since the deviation itself is an estimate.
-constexpr double kFreedom = 4.0;
 // Standard deviations of k1 and k2 of lenses, which stand in for what was not estimated.
 constexpr double kLens[] = {0.2, 0.1};
 
@@ -152,50 +140,28 @@ Directions directions_of(const Rig& rig, const Plan& plan) {
     return out;
 }
 
-// Errors longer than `length`, whose axes have the deviation `deviation`: Student's t in the plane.
-double share_beyond(double length, double deviation) {
-    const double ratio = length / deviation;
-    return std::pow(1 + ratio * ratio / kFreedom, -kFreedom / 2);
-}
-
-double quantile_of(const std::vector<double>& deviations, double q) {
-    double low = 0, high = 0;
-    for (const double deviation : deviations) high = std::max(high, 100 * deviation);
-    if (!std::isfinite(high)) return high;
-    for (int round = 0; round < 60; ++round) {
-        const double middle = 0.5 * (low + high);
-        double beyond = 0;
-        for (const double deviation : deviations) beyond += share_beyond(middle, deviation);
-        (beyond > (1 - q) * static_cast<double>(deviations.size()) ? low : high) = middle;
-    }
-    return high;
-}
-
-constexpr double kFar = 1e9;  // [m]
-
 }  // namespace
-
-ExpectedError expected_error(const std::vector<double>& deviations) {
-    if (deviations.empty()) return {};
-    return {quantile_of(deviations, 0.5), quantile_of(deviations, 0.95)};
-}
 
 ErrorModel::ErrorModel(const WorkingImages& images, const Level& finest, const Rig& rig,
                        const Halves& halves, const Plan& plan)
-    : rig_(rig), halves_(halves) {
+    : directions_(directions_of(rig, plan)) {
     const double reduction = rig.reference.width / static_cast<double>(images.references[0].width);
-    unit_ = kUnitWidth / rig.reference.width / rig.source_density().x();
-    floor_ = kFloor * reduction * kUnitWidth / rig.reference.width;
-    const auto frames = halves_of(images.size());
-    const double count = static_cast<double>(images.size());
-    disagreement_ = static_cast<double>(frames[0].size() * frames[1].size()) / (count * count);
-    directions_ = directions_of(rig, plan);
     const Estimate estimate =
         estimate_of(evidence_of(finest, rig, directions_, plan.options.num_threads), directions_);
-    step_ = estimate.step;
-    covariance_ = estimate.covariance;
-    motion_ = Eigen::MatrixXd::Zero(covariance_.rows(), covariance_.cols());
+    field_.rig = rig;
+    if (halves.rigs[0] && halves.rigs[1]) field_.halves = {*halves.rigs[0], *halves.rigs[1]};
+    field_.unit = kUnitWidth / rig.reference.width / rig.source_density().x();
+    field_.floor = kFloor * reduction * kUnitWidth / rig.reference.width;
+    const auto frames = halves_of(images.size());
+    const double count = static_cast<double>(images.size());
+    field_.disagreement =
+        static_cast<double>(frames[0].size() * frames[1].size()) / (count * count);
+    const Eigen::MatrixXd& basis = directions_.basis;
+    field_.parameters = directions_.parameters;
+    field_.covariance = basis * estimate.covariance * basis.transpose();
+    field_.step = basis * estimate.step;
 
+    motion_ = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
     constexpr int kStep = 16;
     const std::vector<Image>& depths = images.pyramid.at(2).depths;
     for (const Image& depth : depths)
@@ -205,78 +171,12 @@ ErrorModel::ErrorModel(const WorkingImages& images, const Level& finest, const R
                 if (!(z > 0)) continue;
                 const double u = (x + 0.5) * rig.reference.width / depth.width - 0.5,
                              v = (y + 0.5) * rig.reference.height / depth.height - 0.5;
-                if (!sees(u, v, 1 / z)) continue;
-                over_footage_.push_back(deviation(u, v, 1 / z));
-                const Eigen::MatrixXd jacobian = unit_ * jacobian_at(u, v, z);
+                if (!field_.sees(u, v, 1 / z)) continue;
+                over_footage_.push_back(field_.deviation(u, v, 1 / z));
+                const Eigen::MatrixXd jacobian = field_.unit * field_.jacobian(u, v, z) * basis;
                 motion_ += jacobian.transpose() * jacobian;
             }
     if (!over_footage_.empty()) motion_ /= static_cast<double>(over_footage_.size());
-}
-
-Eigen::MatrixXd ErrorModel::jacobian_at(double x, double y, double depth) const {
-    const Eigen::Matrix<double, 2, kNumParameters> all = warp_jacobian(rig_, x, y, depth);
-    Eigen::MatrixXd jacobian(2, directions_.parameters.size());
-    for (int i = 0; i < directions_.parameters.size(); ++i)
-        jacobian.col(i) = all.col(directions_.parameters[i]);
-    return jacobian * directions_.basis;
-}
-
-double ErrorModel::deviation(double x, double y, double inverse_depth) const {
-    const double infinite = std::numeric_limits<double>::infinity();
-    const double depth = 1 / std::max(inverse_depth, 1 / kFar);
-    if (!halves_.rigs[0] || !halves_.rigs[1]) return infinite;
-    const Eigen::MatrixXd jacobian = jacobian_at(x, y, depth);
-    const double predicted = (jacobian * covariance_ * jacobian.transpose()).trace();
-    const double apart =
-        (transfer(*halves_.rigs[0], x, y, depth) - transfer(*halves_.rigs[1], x, y, depth))
-            .squaredNorm();
-    const double missed = (jacobian * step_).squaredNorm();
-    const double variance =
-        (kPredicted * predicted + kApart * disagreement_ * apart + kMissed * missed) / 2;
-    return std::isfinite(variance) ? std::hypot(unit_ * std::sqrt(variance), floor_) : infinite;
-}
-
-double ErrorModel::length(double x, double y, double inverse_depth, double share) const {
-    const double ratio = std::sqrt(kFreedom * (std::pow(1 - share, -2 / kFreedom) - 1));
-    return ratio * deviation(x, y, inverse_depth);
-}
-
-bool ErrorModel::sees(double x, double y, double inverse_depth) const {
-    const Eigen::Vector2d at = transfer(rig_, x, y, 1 / std::max(inverse_depth, 1 / kFar));
-    return at.x() >= 0 && at.y() >= 0 && at.x() <= rig_.source.width - 1 &&
-           at.y() <= rig_.source.height - 1;
-}
-
-Image expected_error_map(const CalibrationReport& report, double depth, int width, int height,
-                         double share) {
-    if (!report.errors) throw std::invalid_argument("the report has no expected error");
-    if (!(depth > 0 && share > 0 && share < 1 && width > 0 && height > 0))
-        throw std::invalid_argument(
-            format("depth = %g, share = %g, size %d x %d, expected a depth > 0, a share in (0, 1) "
-                   "and a size of 1 x 1 px or more",
-                   depth, share, width, height));
-    const ErrorModel& errors = *report.errors;
-    const Pinhole& reference = errors.rig().reference;
-    Image out(width, height, std::numeric_limits<float>::quiet_NaN());
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            const double u = (x + 0.5) * reference.width / width - 0.5,
-                         v = (y + 0.5) * reference.height / height - 0.5;
-            if (errors.sees(u, v, 1 / depth))
-                out.row(y)[x] = static_cast<float>(errors.length(u, v, 1 / depth, share));
-        }
-    return out;
-}
-
-ExpectedError ErrorModel::at(double inverse_depth) const {
-    constexpr int kColumns = 16, kRows = 12;
-    std::vector<double> deviations;
-    for (int i = 0; i < kColumns * kRows; ++i) {
-        const double x = (i % kColumns + 0.5) * rig_.reference.width / kColumns - 0.5,
-                     y = (i / kColumns + 0.5) * rig_.reference.height / kRows - 0.5;
-        if (sees(x, y, inverse_depth)) deviations.push_back(deviation(x, y, inverse_depth));
-    }
-    return expected_error(deviations);
 }
 
 ExpectedError ErrorModel::over_footage() const { return expected_error(over_footage_); }
@@ -288,7 +188,7 @@ std::vector<std::string> ErrorModel::weak_directions() const {
         const char *name, *unit;
         double to_unit, noticeable;
     };
-    const double width = rig_.source.width, height = rig_.source.height;
+    const double width = field_.rig.source.width, height = field_.rig.source.height;
     const Name names[] = {{kTranslationZ, "t_z", "cm", 100, 1},
                           {kTranslationX, "t_x", "cm", 100, 1},
                           {kTranslationY, "t_y", "cm", 100, 1},
@@ -335,11 +235,6 @@ std::vector<std::string> ErrorModel::weak_directions() const {
         out.push_back(text);
     }
     return out;
-}
-
-double ErrorModel::deviation_of(int parameter) const {
-    const Eigen::Index at = directions_.of(parameter);
-    return at < 0 ? 0.0 : std::sqrt(kPredicted * std::max(0.0, covariance_(at, at)));
 }
 
 Eigen::Index Directions::of(int parameter) const {

@@ -12,8 +12,8 @@
 
 #include "calibrate/halves.hpp"
 #include "solve/working_images.hpp"
+#include "xcalib/error_field.hpp"
 #include "xcalib/parameters.hpp"
-#include "xcalib/verdict.hpp"
 
 namespace xcalib {
 
@@ -33,18 +33,7 @@ class ErrorModel {
     ErrorModel(const WorkingImages& images, const Level& finest, const Rig& rig,
                const Halves& halves, const Plan& plan);
 
-    // Of a pixel at a depth, along each axis [px of the reference when its width is 640 px].
-    double deviation(double x, double y, double inverse_depth) const;
-
-    // The length that `share` of the errors there do not exceed.
-    double length(double x, double y, double inverse_depth, double share) const;
-
-    // Whether the source sees a pixel at a depth.
-    bool sees(double x, double y, double inverse_depth) const;
-    const Rig& rig() const { return rig_; }
-
-    // Over the places where the source sees something at this depth; infinite where there is none.
-    ExpectedError at(double inverse_depth) const;
+    const ErrorField& field() const { return field_; }
     // Over the pixels of the footage at their own depths.
     ExpectedError over_footage() const;
 
@@ -52,26 +41,11 @@ class ErrorModel {
     // (root mean square): "t_z by 4 cm, and fx by 1.1 % with it". Only what slides noticeably.
     std::vector<std::string> weak_directions() const;
 
-    // Standard deviation of a parameter, in its own unit; 0 where it is held.
-    double deviation_of(int parameter) const;
-
    private:
-    // dT by the directions.
-    Eigen::MatrixXd jacobian_at(double x, double y, double depth) const;
-
-    Rig rig_;
-    Halves halves_;
-    double unit_;          // to px of the reference at 640 px of width, from px of the source
-    double floor_;         // [the same]
-    double disagreement_;  // share of the halves' squared distance that the fit to all has
     Directions directions_;
-    Eigen::VectorXd step_;              // to where the frames would have it, by the directions
-    Eigen::MatrixXd covariance_;        // of them
-    Eigen::MatrixXd motion_;            // mean of J^T J over the footage [px^2]
+    ErrorField field_;
+    Eigen::MatrixXd motion_;            // mean of J^T J by the directions over the footage [px^2]
     std::vector<double> over_footage_;  // deviations
 };
-
-// Of errors whose axes have these deviations: half of them are no longer than the median.
-ExpectedError expected_error(const std::vector<double>& deviations);
 
 }  // namespace xcalib

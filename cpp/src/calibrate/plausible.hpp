@@ -5,7 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "calibrate/error_model.hpp"
+#include "solve/plan.hpp"
+#include "xcalib/error_field.hpp"
 
 namespace xcalib {
 
@@ -16,6 +17,6 @@ struct Objection {
 
 // `near`: the depth that 5 % of the pixels are nearer than [m].
 std::optional<Objection> implausible_in(const Rig& rig, double near, const Plan& plan,
-                                        const ErrorModel& model);
+                                        const ErrorField& errors);
 
 }  // namespace xcalib

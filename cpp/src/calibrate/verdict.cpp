@@ -54,7 +54,7 @@ constexpr double kContrast = 5.0;
 // Why a rig is not to be trusted, and what to do about it; none where it is.
 std::optional<Objection> objection(const CalibrationReport& report, const WorkingImages& images,
                                    const Rig& rig, const Halves& halves, const Plan& plan,
-                                   const ErrorModel& model) {
+                                   const ErrorField& errors) {
     constexpr double kShare = 0.05, kSameSign = 0.6;
     // Where two searches agree, flow would have to see much to know better: of few frames it is
     // itself wrong by that much.
@@ -101,8 +101,10 @@ std::optional<Objection> objection(const CalibrationReport& report, const Workin
                    same),
             "is it the same footage twice, or are visible edges drawn into it (MSX)? Give thermal "
             "images as they come from the sensor"};
-    if (auto wrong = wrong_depth(check_depth(images, rig, plan))) return wrong;
-    if (auto implausible = implausible_in(rig, report.near_m, plan, model)) return implausible;
+    if (auto wrong = wrong_depth(
+            check_depth(images, rig, {report.near_m, report.middle_m, report.far_m}, plan)))
+        return wrong;
+    if (auto implausible = implausible_in(rig, report.near_m, plan, errors)) return implausible;
     if (report.visible_shift_px > most_shift)
         return Objection{format("flow between the registered images still sees a shift of %.1f px, "
                                 "expected at most %.0f",
@@ -164,17 +166,18 @@ void judge(const WorkingImages& images, const Level& finest, const Rig& rig, con
     verdict.date = today();
     verdict.software = this_software();
     verdict.found = agree(halves, images) && (halves.independent || report.contrast >= kContrast);
-    report.errors = std::make_shared<const ErrorModel>(images, finest, rig, halves, plan);
-    const ErrorModel& model = *report.errors;
+    const ErrorModel model(images, finest, rig, halves, plan);
+    report.errors = std::make_shared<const ErrorField>(model.field());
     report.weak_directions = model.weak_directions();
     verdict.expected_error = model.over_footage();
     verdict.by_depth.clear();
     if (!plan.options.relative_depth)
         for (const double depth :
              {2.0, 3.0, 5.0, 10.0, 20.0, 50.0, std::numeric_limits<double>::infinity()})
-            verdict.by_depth.push_back({depth, model.at(1 / depth)});
+            verdict.by_depth.push_back({depth, model.field().at(1 / depth)});
 
-    const std::optional<Objection> against = objection(report, images, rig, halves, plan, model);
+    const std::optional<Objection> against =
+        objection(report, images, rig, halves, plan, model.field());
     verdict.trusted = !against;
     verdict.reason = against ? against->reason
                              : format(

@@ -49,22 +49,23 @@ Image turned(const Image& image) {
 
 }  // namespace
 
-std::string joined_line(const std::vector<ImageView>& images, const std::string& name) {
-    if (images.empty()) return "";
+std::pair<std::string, std::string> joined_images(const std::vector<ImageView>& images,
+                                                  const std::string& name) {
+    if (images.empty()) return {};
     const double width = images[0].width, height = images[0].height;
     const bool above = is_camera_like(width / (height / 2));
     const bool beside = is_camera_like(width / 2 / height);
-    if (!above && !beside) return "";
+    if (!above && !beside) return {};
     std::size_t seams = 0;
     for (const ImageView& view : images) {
         const Image gray = known_gray(view);
         seams += has_seam(above ? gray : turned(gray));
     }
-    if (4 * seams < 3 * images.size()) return "";
-    return format("%s's frames, %dx%d, look like two images %s; expected %s#%s or %s#%s",
-                  name.c_str(), images[0].width, images[0].height,
-                  above ? "one above the other" : "side by side", name.c_str(),
-                  above ? "top" : "left", name.c_str(), above ? "bottom" : "right");
+    if (4 * seams < 3 * images.size()) return {};
+    return {format("%s's frames, %dx%d, look like two images %s", name.c_str(), images[0].width,
+                   images[0].height, above ? "one above the other" : "side by side"),
+            format("expected %s#%s or %s#%s", name.c_str(), above ? "top" : "left", name.c_str(),
+                   above ? "bottom" : "right")};
 }
 
 }  // namespace xcalib

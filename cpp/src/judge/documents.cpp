@@ -208,6 +208,7 @@ Json json_of(const Evaluation& evaluation) {
             frames[i]["given"] = json_of(evaluation.given_frames[i]);
     }
     out["frames"] = frames;
+    out["verdict"] = evaluation.verdict ? json_of(*evaluation.verdict) : Json();
     return out;
 }
 

@@ -1,5 +1,6 @@
 #include "xcalib/judge/evaluate.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -13,6 +14,7 @@
 #include "xcalib/judge/metrics.hpp"
 #include "xcalib/nec.hpp"
 #include "xcalib/register.hpp"
+#include "xcalib/verdict_on.hpp"
 
 namespace xcalib {
 namespace {
@@ -139,6 +141,65 @@ std::string Evaluation::table() const {
                          height, 100 * valid_share);
 }
 
+std::string Evaluation::verdict_line() const {
+    if (!verdict) return "";
+    return std::string("on these frames: ") + (verdict->trusted ? "trusted: " : "NOT TRUSTED: ") +
+           verdict->line();
+}
+
+std::string Evaluation::difference(const Rig& rig, const std::string& rig_file) const {
+    if (!verdict || !rig.verdict || verdict->trusted == rig.verdict->trusted) return "";
+    if (verdict->trusted)
+        return rig_file + " is not to be trusted by its calibration, but is on these frames";
+    return rig_file +
+           " was trusted when it was calibrated, but is not on these frames: " + verdict->line();
+}
+
+namespace {
+
+// Frames that a verdict rests on: as many as it needs of however many there are, spread over them,
+// in constant memory.
+class Sample {
+   public:
+    void add(const Image& reference, const Image& source, const ImageView& depth) {
+        constexpr std::size_t kMost = 12;
+        if (seen_++ % every_ != 0) return;
+        if (references_.size() == kMost) {
+            for (auto* list : {&references_, &sources_, &depths_}) {
+                for (std::size_t i = 0; i < kMost / 2; ++i) (*list)[i] = std::move((*list)[2 * i]);
+                list->resize(kMost / 2);
+            }
+            every_ *= 2;
+            if ((seen_ - 1) % every_ != 0) return;
+        }
+        Image small = resize_depth(clean_depth(depth), reference.width, reference.height);
+        const auto known = [](float z) { return z > 0; };
+        if (std::none_of(small.pixels.begin(), small.pixels.end(), known)) return;
+        references_.push_back(reference);
+        sources_.push_back(source);
+        depths_.push_back(std::move(small));
+    }
+
+    std::optional<Verdict> verdict(const Rig& rig, int num_threads) const {
+        constexpr int kSmallest = 32;  // [px]: as a calibration wants them
+        if (references_.size() < 2) return std::nullopt;
+        for (const Image* image : {&references_[0], &sources_[0]})
+            if (std::min(image->width, image->height) < kSmallest) return std::nullopt;
+        const auto views = [](const std::vector<Image>& images) {
+            std::vector<ImageView> out;
+            for (const Image& image : images) out.push_back(image.view());
+            return out;
+        };
+        return verdict_on(views(references_), views(sources_), views(depths_), rig, num_threads);
+    }
+
+   private:
+    std::vector<Image> references_, sources_, depths_;
+    std::size_t seen_ = 0, every_ = 1;
+};
+
+}  // namespace
+
 struct Evaluator::State {
     Rig rig;
     int width, num_threads;
@@ -146,6 +207,7 @@ struct Evaluator::State {
     Size size{}, source_size{};
     std::vector<std::pair<Scores, Scores>> frames{};
     std::vector<Scores> given{};
+    Sample sample{};
     std::vector<double> shares{}, lengths_after{}, lengths_before{}, lengths_given{};
 
     void open(const ImageView& reference, const ImageView& source) {
@@ -181,8 +243,10 @@ void Evaluator::add(const ImageView& reference, const ImageView& source, const I
     Image registered(s.size.width, s.size.height);
     std::vector<std::uint8_t> codes(registered.pixels.size());
     const ImageView grid = registered.view();
+    const Image source_image = resized(plain, s.source_size);
+    s.sample.add(target, source_image, depth);
     s.registrar->register_frame(
-        resized(plain, s.source_size).view(), depth,
+        source_image.view(), depth,
         {registered.pixels.data(), grid.width, grid.height, 1, grid.type, grid.row_bytes},
         codes.data());
     cv::Mat mask(grid.height, grid.width, CV_8UC1, codes.data());
@@ -207,7 +271,7 @@ void Evaluator::add(const ImageView& reference, const ImageView& source, const I
                                    s.num_threads, s.lengths_given);
 }
 
-Evaluation Evaluator::result() const {
+Evaluation Evaluator::result(bool judge) const {
     const State& s = *state_;
     if (s.frames.empty()) throw std::invalid_argument("no frames to evaluate");
     Evaluation out;
@@ -223,6 +287,7 @@ Evaluation Evaluator::result() const {
     }
     out.registered = pooled(after, s.lengths_after);
     out.unregistered = pooled(before, s.lengths_before);
+    if (judge) out.verdict = s.sample.verdict(s.rig, s.num_threads);
     if (s.given.empty()) return out;
     out.given = pooled(s.given, s.lengths_given);
     out.given_frames = s.given;

@@ -190,13 +190,25 @@ EdgeSums for_each_warped_row(EdgePass& pass, WorkTimes* times, const Work& work)
 }  // namespace
 
 EdgePair::EdgePair(EdgeMap reference, EdgeMap source, Image depth)
-    : reference_(std::move(reference)), source_(std::move(source)), depth_(std::move(depth)) {
+    : reference_(std::move(reference)), source_(std::move(source)) {
+    set_depth(std::move(depth));
+    reference_.z.reserve(reference_.z.size() + kRoom);  // exactly: to grow would double it
+    reference_.z.resize(reference_.z.size() + kRoom);   // the last row is read beyond its end
+}
+
+void EdgePair::set_depth(Image depth) {
+    depth_ = std::move(depth);
+    reference_energy_ = 0.0;
     for (std::size_t i = 0; i < depth_.pixels.size(); ++i) {
         if (depth_.pixels[i] <= 0) reference_.z[i] = 0;
         reference_energy_ += std::norm(reference_.z[i]);
     }
-    reference_.z.reserve(reference_.z.size() + kRoom);  // exactly: to grow would double it
-    reference_.z.resize(reference_.z.size() + kRoom);   // the last row is read beyond its end
+}
+
+std::shared_ptr<const ImagePair> EdgePair::with_depth(Image depth) const {
+    auto out = std::make_shared<EdgePair>(*this);
+    out->set_depth(std::move(depth));
+    return out;
 }
 
 NecValue EdgePair::evaluate(const Rig& rig) const {

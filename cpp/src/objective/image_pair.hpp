@@ -20,6 +20,8 @@ class ImagePair {
     virtual NecNormalEquations normal_equations(const Rig& rig,
                                                 const Parameters& parameters) const = 0;
     virtual const Image& depth() const = 0;  // on the reference's grid [m]
+    // The same images with other depth, which is compared only where this one is known too.
+    virtual std::shared_ptr<const ImagePair> with_depth(Image depth) const = 0;
     // The share of the normal equations' curvature that the cost has: only edges with a partner
     // bend it. As it was measured, by what steps lowered the cost by and what they were to.
     virtual double curvature(const NecValue& at) const = 0;
@@ -40,6 +42,11 @@ class NecPair : public ImagePair {
         return equations_from_gram(pass.gram, value_of(frame_, pass.sums));
     }
     const Image& depth() const override { return frame_.depth; }
+    std::shared_ptr<const ImagePair> with_depth(Image depth) const override {
+        auto out = std::make_shared<NecPair>(*this);
+        out->frame_.set_depth(std::move(depth));
+        return out;
+    }
     double curvature(const NecValue& at) const override {
         const double aligned = std::max(0.0, at.aligned);
         return std::min(0.5, 0.8 * aligned) * aligned;
@@ -58,9 +65,12 @@ class EdgePair : public ImagePair {
     NecNormalEquations normal_equations(const Rig& rig,
                                         const Parameters& parameters) const override;
     const Image& depth() const override { return depth_; }
+    std::shared_ptr<const ImagePair> with_depth(Image depth) const override;
     double curvature(const NecValue& at) const override { return at.aligned; }
 
    private:
+    void set_depth(Image depth);
+
     EdgeMap reference_, source_;
     Image depth_;
     double reference_energy_ = 0.0;

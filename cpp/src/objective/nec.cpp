@@ -94,6 +94,15 @@ float mean_gradient(const Image& image) {
     return static_cast<float>(sum / (image.width - 2) / (image.height - 2));
 }
 
+void NecFrame::set_depth(Image known) {
+    depth = std::move(known);
+    reference_energy = 0.0;
+    for (std::size_t i = 0; i < depth.pixels.size(); ++i) {
+        if (depth.pixels[i] <= 0) reference.x[i] = reference.y[i] = 0.0f;
+        reference_energy += squared(reference.x[i], reference.y[i]);
+    }
+}
+
 NecFrame make_nec_frame(const Image& reference, const Image& source, const Image& depth,
                         const Rig& rig, float floor) {
     NecFrame frame;
@@ -102,12 +111,7 @@ NecFrame make_nec_frame(const Image& reference, const Image& source, const Image
     frame.depth = depth;
     frame.source = source;
     frame.source_mean = warped_mean_gradient(frame, rig);
-    for (std::size_t i = 0; i < depth.pixels.size(); ++i) {
-        float& x = frame.reference.x[i];
-        float& y = frame.reference.y[i];
-        if (depth.pixels[i] <= 0) x = y = 0.0f;
-        frame.reference_energy += squared(x, y);
-    }
+    frame.set_depth(std::move(frame.depth));
     // The last row is read beyond its end.
     frame.reference.x.resize(frame.reference.x.size() + kRoom);
     frame.reference.y.resize(frame.reference.y.size() + kRoom);

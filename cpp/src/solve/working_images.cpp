@@ -272,6 +272,16 @@ Level make_level(const WorkingImages& images, int factor, const Rig& rig, int nu
     return level;
 }
 
+Level with_depths(const Level& level, const std::vector<Image>& depths,
+                  const WorkingImages& images) {
+    const bool whole = level.factor >= kCoarse || !images.parts.depth_edges;
+    Level out = level;
+    for (std::size_t i = 0; i < depths.size(); ++i)
+        out.pairs[i] =
+            level.pairs[i]->with_depth(whole ? depths[i] : without_depth_edges(depths[i]));
+    return out;
+}
+
 Level fold_of(const Level& level, std::size_t folds, std::size_t fold, bool inside) {
     Level part = level;
     part.pairs.clear();

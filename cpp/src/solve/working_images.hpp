@@ -70,6 +70,10 @@ struct Level {
 Level make_level(const WorkingImages& images, int factor, const Rig& rig, int num_threads);
 // Its sizes only, for sources no finer than the reference.
 Level make_sizes(const WorkingImages& images, int factor, const Rig& rig);
+// The same with other depth maps of its size, one for each pair, and compared where its own are
+// known too.
+Level with_depths(const Level& level, const std::vector<Image>& depths,
+                  const WorkingImages& images);
 // Every `folds`-th pair of a level from `fold` on, or all but those.
 Level fold_of(const Level& level, std::size_t folds, std::size_t fold, bool inside);
 // The same with the NEC at any factor.

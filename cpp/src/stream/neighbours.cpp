@@ -78,10 +78,4 @@ void add_lags(const LagReport& lag, const TimeOffset& offset, const Stream& all_
             : "try " + option_for_lag(offset, lag.frames, clock_of(all_sources.frames()).value()));
 }
 
-void distrust(const std::string& line, CalibrationResult& result) {
-    if (line.empty()) return;
-    const std::size_t end = line.find("; ");
-    result.distrust(line.substr(0, end), end == std::string::npos ? "" : line.substr(end + 2));
-}
-
 }  // namespace xcalib

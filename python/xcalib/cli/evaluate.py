@@ -28,7 +28,7 @@ from .arguments import (
     with_scalar_sources,
     with_straight_rows,
 )
-from .errors import NOT_TRUSTED, require_trusted, stop
+from .errors import NOT_TRUSTED, require_trusted, stop, warn
 from .options import Input, Output
 from .sections import Sectioned
 
@@ -92,14 +92,19 @@ def command(
         width,
         threads,
         None if registered is None else given_images(registered, frames),
+        judge=True,
     )
     click.echo(result.table())
+    if result.verdict is not None:
+        click.echo(result.verdict_line())
     say_depth(frames)
     if json_file is not None:
         names = [frames.references.where(index) for index in range(len(frames))]
         write_bytes(json_file, evaluation_document(result, str(rig_file), names).encode())
     if not result.valid_share:
         stop(NOT_TRUSTED, f"no pixel is valid in {len(frames)} frames, nothing could be scored")
+    if line := result.difference(rig, str(rig_file)):
+        warn(line)
     require_trusted(rig, rig_file)
 
 

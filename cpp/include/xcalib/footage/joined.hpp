@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "xcalib/export.hpp"
@@ -10,8 +11,9 @@
 
 namespace XCALIB_EXPORT xcalib {
 
-// A line where most of the images look like two, joined at their middle: twice as high (or wide) as
-// cameras' images are, with a seam there; else nothing. `name`: REFERENCE or SOURCE.
-std::string joined_line(const std::vector<ImageView>& images, const std::string& name);
+// What is wrong, and what to give instead, where most of the images look like two, joined at their
+// middle: twice as high (or wide) as cameras' images are, with a seam there; else empty. `name`:
+// REFERENCE or SOURCE.
+std::pair<std::string, std::string> joined_images(const std::vector<ImageView>& images, const std::string& name);
 
 }  // namespace xcalib

@@ -15,6 +15,7 @@
 #include "xcalib/camera.hpp"
 #include "xcalib/export.hpp"
 #include "xcalib/image.hpp"
+#include "xcalib/verdict.hpp"
 
 namespace XCALIB_EXPORT xcalib {
 
@@ -34,10 +35,17 @@ struct Evaluation {
     // Of images that another method registered, over the same pixels, where they were given.
     std::optional<Scores> given;
     std::vector<Scores> given_frames;
+    // Of the rig on a dozen of these frames, as a calibration would have it; none where it was not
+    // asked for, or where no two frames can be judged.
+    std::optional<Verdict> verdict;
 
     // Change of a score by registration [%], NaN where undefined.
     double gain(std::size_t score) const;
     std::string table() const;  // one line a score
+    // What the verdict on these frames is, and whether it differs from that of the rig's file: a
+    // line each, empty where there is nothing to say.
+    std::string verdict_line() const;
+    std::string difference(const Rig& rig, const std::string& rig_file) const;
 };
 
 class Evaluator {
@@ -52,7 +60,8 @@ class Evaluator {
     void add(const ImageView& reference, const ImageView& source, const ImageView& depth,
              const ImageView* given = nullptr);
 
-    Evaluation result() const;  // throws std::invalid_argument without a frame
+    // Throws std::invalid_argument without a frame. `judge`: with a verdict, which takes seconds.
+    Evaluation result(bool judge = false) const;
 
    private:
     struct State;

@@ -27,7 +27,4 @@ LagReport fit_lags(const FittedFrames& frames, Stream& all_sources, const Rig& r
 void add_lags(const LagReport& lag, const TimeOffset& offset, const Stream& all_sources,
               CalibrationResult& result);
 
-// The result is not to be trusted, for the reason in the line; an empty one changes nothing.
-void distrust(const std::string& line, CalibrationResult& result);
-
 }  // namespace xcalib
