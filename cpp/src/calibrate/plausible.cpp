@@ -86,7 +86,7 @@ std::optional<Objection> implausible_in(const Rig& rig, double near, const Plan&
         if (skew.implausible())
             return Objection{format("the source's pixels are skewed by %.1f +- %.1f %%",
                                     100 * skew.value, 100 * skew.deviation),
-                             "does its shutter roll while the rig moves?"};
+                             "does its shutter roll while the rig moves? See --source-readout"};
         if (aspect.implausible())
             return Objection{format("the source's fy is %.0f +- %.0f %% of its fx",
                                     100 * std::exp(aspect.value), 100 * aspect.deviation),
