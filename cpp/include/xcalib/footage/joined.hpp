@@ -14,6 +14,7 @@ namespace XCALIB_EXPORT xcalib {
 // What is wrong, and what to give instead, where most of the images look like two, joined at their
 // middle: twice as high (or wide) as cameras' images are, with a seam there; else empty. `name`:
 // REFERENCE or SOURCE.
-std::pair<std::string, std::string> joined_images(const std::vector<ImageView>& images, const std::string& name);
+std::pair<std::string, std::string> joined_images(const std::vector<ImageView>& images,
+                                                  const std::string& name);
 
 }  // namespace xcalib
