@@ -93,7 +93,7 @@ struct CalibrationReport {
     std::vector<CandidateReport> candidates;
     std::vector<LevelReport> levels;
     LensReport lens;
-    std::vector<AdamStep> steps;  // of Solver::adam
+    std::vector<AdamStep> steps;               // of Solver::adam
     std::shared_ptr<const ErrorField> errors;  // that are expected
     // What can slide, and with what, while the footage's pixels move by a tenth of a pixel.
     std::vector<std::string> weak_directions;
