@@ -9,14 +9,13 @@
 
 #include "base/format.hpp"
 #include "base/parallel.hpp"
+#include "calibrate/judging.hpp"
 #include "calibrate/static_edges.hpp"
 #include "geometry/projector.hpp"
 #include "solve/solve.hpp"
 
 namespace xcalib {
 namespace {
-
-constexpr int kFactor = 2;
 
 double mean(const std::vector<double>& values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
@@ -59,7 +58,7 @@ bool is_plane(const Image& depth) {
 
 // One map of a scene for all frames of a camera that moves.
 bool one_depth_for_all(const WorkingImages& images) {
-    const std::vector<Image>& depths = images.pyramid.at(kFactor).depths;
+    const std::vector<Image>& depths = images.pyramid.at(kJudgedFactor).depths;
     for (const Image& depth : depths)
         if (depth.pixels != depths[0].pixels) return false;
     return depths.size() > 1 && !is_plane(depths[0]) && !camera_stands_still(images);
@@ -165,12 +164,12 @@ void exchange(const WorkingImages& images, const Rig& rig, double middle, int nu
     constexpr std::size_t kRun = 12;
     std::vector<std::size_t> following(std::min(images.size(), kRun));
     std::iota(following.begin(), following.end(), (images.size() - following.size()) / 2);
-    const Prepared run(images.subset(following), {kFactor}, middle, rig, num_threads);
+    const Prepared run(images.subset(following), {kJudgedFactor}, middle, rig, num_threads);
     const auto later = [&](std::size_t frames) {
-        std::vector<Image> depths = run.depths(kFactor);
+        std::vector<Image> depths = run.depths(kJudgedFactor);
         std::rotate(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(frames),
                     depths.end());
-        return agreement_of(run.with(kFactor, depths), rig, num_threads);
+        return agreement_of(run.with(kJudgedFactor, depths), rig, num_threads);
     };
     const std::vector<double> own = later(0), far = later(following.size() / 2);
     out.own = mean(own);
@@ -205,16 +204,17 @@ DepthCheck check_depth(const WorkingImages& images, const Rig& rig, const DepthR
     const double x = (rig.reference.width - 1) / 2.0, y = (rig.reference.height - 1) / 2.0;
     out.parallax_px = (transfer(rig, x, y, depths.near) - transfer(rig, x, y, depths.far)).norm() /
                       rig.source_density().x() * 640 / rig.reference.width;
-    out.is_plane = is_plane(images.pyramid.at(kFactor).depths[0]);
+    out.is_plane = is_plane(images.pyramid.at(kJudgedFactor).depths[0]);
     out.one_for_all = one_depth_for_all(images);
     exchange(images, rig, depths.middle, num_threads, out);
 
-    const Prepared few(images.spread(kFrames), {kCoarse, kFactor}, depths.middle, rig, num_threads);
+    const Prepared few(images.spread(kFrames), {kCoarse, kJudgedFactor}, depths.middle, rig,
+                       num_threads);
     const auto fitted = [&](const auto& change, double hopeless) {
         const auto changed = [&](int factor) {
             return few.with(factor, change(few.depths(factor)));
         };
-        return refitted({changed(kCoarse), changed(kFactor)}, rig, plan, hopeless);
+        return refitted({changed(kCoarse), changed(kJudgedFactor)}, rig, plan, hopeless);
     };
     const Refitted right = fitted([](const std::vector<Image>& given) { return given; }, 0);
     if (right.fine.empty()) return out;

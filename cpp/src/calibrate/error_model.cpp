@@ -6,12 +6,11 @@
 
 #include "base/format.hpp"
 #include "base/parallel.hpp"
+#include "calibrate/judging.hpp"
 #include "solve/solve.hpp"
 
 namespace xcalib {
 namespace {
-
-constexpr double kUnitWidth = 640;  // [px] of the reference, in whose pixels errors are given
 
 // A frame tells of some directions only: so much of what all say goes to every direction alike.
 constexpr double kShrinkage = 0.3;

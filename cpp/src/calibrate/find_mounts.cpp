@@ -10,10 +10,10 @@
 namespace xcalib {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180;
 // A peak of the search is wider than the step: what it rounds, the start from a mount finds.
 constexpr double kRollStep = 8, kScaleStep = 1.12;
-constexpr std::size_t kFrames = 4;  // they decide on what is tried in full, no more
+constexpr std::size_t kTriedFrames = 4;  // they decide on what is tried in full, no more
 
 }  // namespace
 
@@ -39,8 +39,9 @@ std::vector<Mount> find_mounts(const WorkingImages& all_images, const ImageView&
     space.hypotheses.resize(
         1);  // the field of view of the reference hardly changes which roll fits
     space.rolls.clear();
-    for (double roll = 0; roll < 360; roll += kRollStep) space.rolls.push_back(roll * kDegree);
-    const WorkingImages images = all_images.spread(kFrames);
+    for (double roll = 0; roll < 360; roll += kRollStep)
+        space.rolls.push_back(roll * kRadiansPerDegree);
+    const WorkingImages images = all_images.spread(kTriedFrames);
     struct Likely {
         Mount mount;
         double score;

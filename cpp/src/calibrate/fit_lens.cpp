@@ -11,7 +11,7 @@ namespace {
 
 // Smaller gains in NEC are not worth a lens; nor are those of fewer of their own deviations.
 constexpr double kGain = 1e-3, kDeviations = 3.0;
-constexpr std::size_t kPairs = 4;  // fewer show no deviation
+constexpr std::size_t kLeastPairs = 4;  // fewer show no deviation
 
 struct Gain {
     double mean, deviation;  // of the mean
@@ -64,7 +64,7 @@ LensReport fit_lens(const Level& level, double share_limit, double tolerance, co
         report.gain = pooled(level, rig, num_threads).nec - before;
         return report;
     }
-    if (level.pairs.size() < kPairs) return report;
+    if (level.pairs.size() < kLeastPairs) return report;
     report.tried = true;
 
     // By how many coefficients they have; each is worth looking at where all frames gain.

@@ -5,14 +5,12 @@
 #include <stdexcept>
 
 #include "base/median.hpp"
+#include "calibrate/judging.hpp"
 #include "geometry/projector.hpp"
 #include "solve/solve.hpp"
 
 namespace xcalib {
 namespace {
-
-// Half resolution: fine enough to separate a fit from a near miss, a quarter of the cost.
-constexpr int kFactor = 2;
 
 // Each half is searched on so many of its frames: two that agree are safer than one search of all.
 constexpr std::size_t kHalfFrames = 6;
@@ -20,8 +18,8 @@ constexpr std::size_t kHalfFrames = 6;
 // From some of the half's frames to all of them. Half resolution is enough to tell whether two
 // halves agree; what the finest level adds, the gradients of its frames show (error_model.hpp).
 void refine_half(const WorkingImages& half, const Plan& plan, Start& start) {
-    if (half.size() <= kHalfFrames || start.levels.back().factor != kFactor) return;
-    const Level level = make_level(half, kFactor, start.rig, plan.options.num_threads);
+    if (half.size() <= kHalfFrames || start.levels.back().factor != kJudgedFactor) return;
+    const Level level = make_level(half, kJudgedFactor, start.rig, plan.options.num_threads);
     const double limit =
         share_limit(pooled(level, start.rig, plan.options.num_threads).valid_share);
     start.levels.push_back(solve_stage(half, level, 2, limit, 1e-5, plan, start.rig));
@@ -72,7 +70,7 @@ Halves refit_halves(const WorkingImages& images, const Rig& rig, const Plan& pla
     quick.options.max_iterations = std::min(plan.options.max_iterations, 12);
     for (std::size_t k = 0; k < 2; ++k) {
         const WorkingImages half = images.subset(halves_of(images.size())[k]);
-        const Level level = make_level(half, kFactor, rig, plan.options.num_threads);
+        const Level level = make_level(half, kJudgedFactor, rig, plan.options.num_threads);
         Rig fitted = rig;
         solve_level(level, {}, 2, share_limit(valid_share), 1e-5, quick, rig, fitted);
         out.rigs[k] = fitted;
@@ -82,7 +80,7 @@ Halves refit_halves(const WorkingImages& images, const Rig& rig, const Plan& pla
 
 double merit_on(const WorkingImages& images, const Rig& rig, const Plan& plan) {
     const int num_threads = plan.options.num_threads;
-    const Level level = make_level(images.spread(kStartFrames), kFactor, rig, num_threads);
+    const Level level = make_level(images.spread(kStartFrames), kJudgedFactor, rig, num_threads);
     return merit(pooled(level, rig, num_threads));
 }
 
@@ -93,14 +91,14 @@ bool agree(const Halves& halves, const WorkingImages& images) {
 double distance(const Halves& halves, const WorkingImages& images) {
     if (!halves.rigs[0] || !halves.rigs[1]) return std::numeric_limits<double>::infinity();
     constexpr int kStep = 8;
-    const Level sizes = make_sizes(images, kFactor, *halves.rigs[0]);
+    const Level sizes = make_sizes(images, kJudgedFactor, *halves.rigs[0]);
     const Rig a = sizes.rig_at(*halves.rigs[0]), b = sizes.rig_at(*halves.rigs[1]);
     const auto seen = [](const Pinhole& camera, const Eigen::Vector2d& at) {
         return at.x() >= 0 && at.y() >= 0 && at.x() <= camera.width - 1 &&
                at.y() <= camera.height - 1;
     };
     std::vector<double> distances;
-    for (const Image& depth : images.pyramid.at(kFactor).depths)
+    for (const Image& depth : images.pyramid.at(kJudgedFactor).depths)
         for (int y = 0; y < depth.height; y += kStep)
             for (int x = 0; x < depth.width; x += kStep) {
                 const Eigen::Vector2d one = transfer(a, x, y, depth.row(y)[x]),
@@ -109,7 +107,7 @@ double distance(const Halves& halves, const WorkingImages& images) {
                     distances.push_back((one - other).norm());
             }
     if (distances.empty()) return std::numeric_limits<double>::infinity();
-    return kFactor / a.source_density().x() * median(std::move(distances));
+    return kJudgedFactor / a.source_density().x() * median(std::move(distances));
 }
 
 }  // namespace xcalib

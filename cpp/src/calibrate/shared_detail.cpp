@@ -5,13 +5,13 @@
 #include <vector>
 
 #include "base/parallel.hpp"
+#include "calibrate/judging.hpp"
 #include "xcalib/gray.hpp"
 #include "xcalib/warp.hpp"
 
 namespace xcalib {
 namespace {
 
-constexpr int kFactor = 2;
 constexpr std::size_t kFrames = 8;
 
 // Sums of a b cos and of a b |cos| over the pixels, with a and b the lengths of the gradients.
@@ -52,9 +52,9 @@ Signs signs_of(const Image& reference, const WarpedImage& source) {
 
 double same_sign(const WorkingImages& images, const Rig& rig, int num_threads) {
     const WorkingImages few = images.spread(kFrames);
-    const Level sizes = make_sizes(few, kFactor, rig);
+    const Level sizes = make_sizes(few, kJudgedFactor, rig);
     const Rig at_level = sizes.rig_at(rig);
-    const ReducedImages& level = few.pyramid.at(kFactor);
+    const ReducedImages& level = few.pyramid.at(kJudgedFactor);
     std::vector<Signs> signs(few.size());
     parallel_each(static_cast<int>(few.size()), num_threads, [&](int i) {
         const Image source = resize_area(few.sources[i], sizes.source_width, sizes.source_height);

@@ -11,6 +11,7 @@
 #include "base/median.hpp"
 #include "calibrate/depth_check.hpp"
 #include "calibrate/error_model.hpp"
+#include "calibrate/judging.hpp"
 #include "calibrate/plausible.hpp"
 #include "calibrate/shared_detail.hpp"
 #include "calibrate/visible_shift.hpp"
@@ -22,7 +23,6 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 
 // Half resolution: fine enough to separate a fit from a near miss, a quarter of the cost.
-constexpr int kFactor = 2;
 
 // NEC of the same rig turned off its place: what the footage gives where nothing is aligned.
 struct Baseline {
@@ -142,8 +142,8 @@ void judge(const WorkingImages& images, const Level& finest, const Rig& rig, con
     const int num_threads = plan.options.num_threads;
     // Where halves were found apart, contrast only helps to say why they disagree.
     constexpr std::size_t kFrames = 4;
-    const Level level =
-        make_level(halves.independent ? images.spread(kFrames) : images, kFactor, rig, num_threads);
+    const Level level = make_level(halves.independent ? images.spread(kFrames) : images,
+                                   kJudgedFactor, rig, num_threads);
     const double here = pooled(level, rig, num_threads).nec;
     const Baseline baseline = displaced(level, rig, num_threads);
     report.baseline_nec = baseline.mean;

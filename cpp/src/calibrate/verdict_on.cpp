@@ -5,15 +5,13 @@
 #include "base/parallel.hpp"
 #include "calibrate/find_mounts.hpp"
 #include "calibrate/halves.hpp"
+#include "calibrate/judging.hpp"
 #include "calibrate/verdict.hpp"
 #include "geometry/projector.hpp"
 #include "solve/solve.hpp"
 
 namespace xcalib {
 namespace {
-
-constexpr int kFactor = 2;
-constexpr double kUnitWidth = 640;
 
 // Only the pose moves.
 Plan pose_plan(const Rig& rig, int num_threads) {
@@ -35,7 +33,7 @@ struct Refit {
 
 Refit refit(const WorkingImages& images, const Rig& rig, const Plan& plan) {
     Refit out{rig, {}};
-    for (const int factor : {kCoarse, kFactor}) {
+    for (const int factor : {kCoarse, kJudgedFactor}) {
         out.level = make_level(images, factor, out.rig, plan.options.num_threads);
         const double share = pooled(out.level, out.rig, plan.options.num_threads).valid_share;
         const LevelReport report =
@@ -51,7 +49,7 @@ ExpectedError shift_between(const WorkingImages& images, const Rig& a, const Rig
     constexpr int kStep = 8;
     const double unit = kUnitWidth / (a.reference.width * a.source_density().x());
     std::vector<double> lengths;
-    for (const Image& depth : images.pyramid.at(kFactor).depths)
+    for (const Image& depth : images.pyramid.at(kJudgedFactor).depths)
         for (int y = kStep / 2; y < depth.height; y += kStep)
             for (int x = kStep / 2; x < depth.width; x += kStep) {
                 const double z = depth.row(y)[x],

@@ -5,13 +5,14 @@
 #include <limits>
 
 #include "base/median.hpp"
+#include "calibrate/judging.hpp"
 #include "geometry/projector.hpp"
 #include "solve/flow_term.hpp"
 
 namespace xcalib {
 namespace {
 
-constexpr int kFactor = 2, kMaxShift = 12;  // [px of that level]
+constexpr int kMaxShift = 12;  // [px of the level that is judged]
 constexpr std::size_t kPairs = 4;
 constexpr double kCells = 0.1;  // share of those that the source sees for which flow must be known
 constexpr double kShare = 0.9;  // of the pixels, which are shifted by no more than the result
@@ -62,13 +63,13 @@ Eigen::Matrix<double, 3, 2> linear_part(const std::vector<Eigen::RowVector3d>& r
 double visible_shift(const WorkingImages& images, const Rig& rig, int num_threads) {
     const WorkingImages few = images.spread(kPairs);
     const std::vector<FlowTargets> flow =
-        estimate_flow(few, kFactor, rig, nullptr, kMaxShift, num_threads);
+        estimate_flow(few, kJudgedFactor, rig, nullptr, kMaxShift, num_threads);
     std::vector<Eigen::RowVector3d> seen, known;
     std::vector<Eigen::RowVector2d> shifts;
     std::vector<double> weights;
     for (std::size_t i = 0; i < flow.size(); ++i) {
         const Rig& here = flow[i].rig;
-        const Image& depth = few.pyramid.at(kFactor).depths[i];
+        const Image& depth = few.pyramid.at(kJudgedFactor).depths[i];
         for (int y = kFlowCell / 2; y < depth.height; y += kFlowCell)
             for (int x = kFlowCell / 2; x < depth.width; x += kFlowCell)
                 if (Place(here, x, y, depth.row(y)[x]).seen)
@@ -89,7 +90,7 @@ double visible_shift(const WorkingImages& images, const Rig& rig, int num_thread
     const Eigen::Matrix<double, 3, 2> fitted = linear_part(known, shifts, weights);
     std::vector<double> lengths;
     for (const Eigen::RowVector3d& row : seen) lengths.push_back((row * fitted).norm());
-    return kFactor * quantile(std::move(lengths), kShare);
+    return kJudgedFactor * quantile(std::move(lengths), kShare);
 }
 
 }  // namespace xcalib

@@ -166,7 +166,7 @@ class Sample {
         if (seen_++ % every_ != 0) return;
         if (references_.size() == kMost) {
             for (auto* list : {&references_, &sources_, &depths_}) {
-                for (std::size_t i = 0; i < kMost / 2; ++i) (*list)[i] = std::move((*list)[2 * i]);
+                for (std::size_t i = 1; i < kMost / 2; ++i) (*list)[i] = std::move((*list)[2 * i]);
                 list->resize(kMost / 2);
             }
             every_ *= 2;
