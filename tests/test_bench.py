@@ -143,7 +143,9 @@ def test_each_benchmark_is_listed_and_has_its_place() -> None:
     import run
 
     assert pages.marked(run.DOCS) == {"software", *run.PUBLISHED}
-    scripts = [path for folder in ("speed", "accuracy") for path in (BENCH / folder).glob("*.py")]
+    scripts = [
+        path for folder in ("speed", "accuracy", "scale") for path in (BENCH / folder).glob("*.py")
+    ]
     assert sorted(run.ALL.values()) == sorted(scripts)
     kept = json.loads(run.KEPT.read_text())
     assert set(run.PUBLISHED) <= set(kept) <= set(run.ALL)

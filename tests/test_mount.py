@@ -45,7 +45,6 @@ def mirrored(image: NDArray) -> NDArray:
 
 # How the source image is changed, what is said, and where a pixel (x, y) of w x h goes.
 MOUNTS = {
-    "upside down": (turned_180, lambda x, y, w, h: (w - 1 - x, h - 1 - y)),
     "turned by 90 deg clockwise": (turned_90, lambda x, y, w, h: (h - 1 - y, x)),
     "mirrored": (mirrored, lambda x, y, w, h: (w - 1 - x, y)),
 }

@@ -77,7 +77,7 @@ def whole_lines(journal: Path) -> list[str]:
     [
         (signal.SIGINT, ()),
         (signal.SIGTERM, ()),
-        (signal.SIGKILL, ("--depth-steady", "--overlay")),
+        (signal.SIGKILL, ("--overlay",)),
     ],
 )
 def test_an_interrupted_folder_loses_and_repeats_nothing(
