@@ -91,13 +91,6 @@ std::optional<double> parse_readout(const std::string& option, const std::string
     return share;
 }
 
-double RowDelay::largest(int width, int height) const {
-    double most = 0;
-    for (const double u : {0.0, width - 1.0})
-        for (const double v : {0.0, height - 1.0}) most = std::max(most, std::abs((*this)(u, v)));
-    return most;
-}
-
 RowDelay row_delay(const Readout& readout, const std::optional<Rig>& rig, int width, int height) {
     // The first row is read at 0, the last at the readout.
     const double last = std::max(height - 1, 1);

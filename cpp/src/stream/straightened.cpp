@@ -4,6 +4,7 @@
 #include <list>
 #include <mutex>
 
+#include "base/median.hpp"
 #include "xcalib/error.hpp"
 #include "xcalib/gray.hpp"
 #include "xcalib/stream/interrupts.hpp"
@@ -28,17 +29,12 @@ struct GrayPair {
             image = resize_area(image, width, height);
             values.insert(values.end(), image.pixels.begin(), image.pixels.end());
         }
-        const auto at = [&](double share) {
-            const auto place = values.begin() + static_cast<std::ptrdiff_t>(
-                                                    share * static_cast<double>(values.size() - 1));
-            std::nth_element(values.begin(), place, values.end());
-            return *place;
-        };
-        const float low = at(0.01), range = std::max(at(0.99) - low, 1e-6f);
+        const double low = quantile(values, 0.01);
+        const double range = std::max(quantile(std::move(values), 0.99) - low, 1e-6);
         for (const auto& [image, bytes] : {std::pair(&gray[0], &first), {&gray[1], &second}})
             for (const float value : image->pixels)
                 bytes->push_back(
-                    static_cast<std::uint8_t>(255 * std::clamp((value - low) / range, 0.0f, 1.0f)));
+                    static_cast<std::uint8_t>(255 * std::clamp((value - low) / range, 0.0, 1.0)));
     }
     ImageView view(const std::vector<std::uint8_t>& bytes) const {
         return {bytes.data(), width, height, 1, PixelType::u8, width};
@@ -83,21 +79,13 @@ Picture straightened(const Picture& picture, const Motion& motion, const RowDela
     return out;
 }
 
-class Straightened : public Stream {
+class Straightened : public Wrapped {
    public:
     Straightened(StreamPointer stream, FrameClock clock, const RowDelay& delay,
                  EstimateMotion motion, bool nearest)
-        : stream_(std::move(stream)), clock_(std::move(clock)), delay_(delay),
-          motion_(std::move(motion)), nearest_(nearest) {
-        times = stream_->times;
-        said = stream_->said;
-    }
-    int size() const override { return stream_->size(); }
-    std::string name(int index) const override { return stream_->name(index); }
-    std::string where(int index) const override { return stream_->where(index); }
-    std::filesystem::path file(int index) const override { return stream_->file(index); }
+        : Wrapped(std::move(stream)), clock_(std::move(clock)), delay_(delay),
+          motion_(std::move(motion)), nearest_(nearest) {}
     std::vector<std::filesystem::path> paths() const override { return stream_->paths(); }
-    bool concurrent() const override { return stream_->concurrent(); }
     std::optional<HeaderSize> size_in_header(int index) override {
         return stream_->size_in_header(index);
     }
@@ -137,7 +125,6 @@ class Straightened : public Stream {
         return picture;
     }
 
-    StreamPointer stream_;
     FrameClock clock_;
     RowDelay delay_;
     EstimateMotion motion_;

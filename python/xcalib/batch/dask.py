@@ -13,7 +13,7 @@ from typing import Any
 
 from .._core import InputError
 from .shard import VERSION, Outcome, Shard, run_shard
-from .workers import Done, Gone, Workers, WorkersGone
+from .workers import Done, Gone, Workers, WorkersGone, drained
 
 ANSWER = 6.0
 """For a scheduler to answer, and for a worker to be there [s]."""
@@ -168,11 +168,7 @@ class DaskWorkers(Workers):
         raise WorkersGone(f"{self._address}: no scheduler with workers came back in {RETURN:.0f} s")
 
     def wait(self, seconds: float) -> list[Done]:
-        done: list[Done] = []
-        with contextlib.suppress(queue.Empty):
-            done.append(self._done.get(timeout=seconds))
-            while True:
-                done.append(self._done.get_nowait())
+        done = drained(self._done, seconds)
         for ticket, _ in done:
             self._futures.pop(ticket, None)  # the scheduler forgets it then
         if not done and self._client.status != "running":

@@ -6,13 +6,9 @@ import csv
 import io
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-from ..report.page import number
-from ..report.page import text_of as text_of_report
+from ..report.template import rendered, text_of
 from .calibrate_shard import REPORT, RIG
 from .run import STATES, DriveState
 from .store import is_there, join
@@ -83,24 +79,15 @@ def as_json(states: Sequence[DriveState]) -> bytes:
 
 def as_page(states: Sequence[DriveState], title: str) -> bytes:
     """The page: those that need a person first."""
-    environment = Environment(
-        loader=FunctionLoader(_text_of),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = number
     rows = [row(state) | {"links": _links(state)} for state in states]
     counts = {name: sum(one["state"] == name for one in rows) for name in STATES}
-    text = environment.get_template("index.html").render(
-        title=title,
-        rows=rows,
-        counts=counts,
-        style=text_of_report("style.css"),
-        frames=sum(one["registered"] or 0 for one in rows),
-    )
-    return text.encode()
+    facts = {
+        "title": title,
+        "rows": rows,
+        "counts": counts,
+        "frames": sum(one["registered"] or 0 for one in rows),
+    }
+    return rendered(__package__, "index.html", facts, text_of(__package__, "index.css")).encode()
 
 
 def _links(state: DriveState) -> list[tuple[str, str]]:
@@ -108,7 +95,3 @@ def _links(state: DriveState) -> list[tuple[str, str]]:
     return [
         (name, f"{state.job.name}/{name}") for name in names if is_there(join(state.folder, name))
     ]
-
-
-def _text_of(name: str) -> str:
-    return (Path(__file__).parent / name).read_text("utf-8")

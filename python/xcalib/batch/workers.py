@@ -28,6 +28,16 @@ Done = tuple[int, Outcome | Gone]
 """The ticket of a shard that was submitted, and what came of it."""
 
 
+def drained(done: queue.SimpleQueue[Done], seconds: float) -> list[Done]:
+    """What a queue has: waited for, this long at the most, where it has nothing yet."""
+    found = []
+    with contextlib.suppress(queue.Empty):
+        found.append(done.get(timeout=seconds))
+        while True:
+            found.append(done.get_nowait())
+    return found
+
+
 class WorkersGone(RuntimeError):
     """No worker is left, and none came back."""
 
@@ -137,12 +147,7 @@ class OnExecutor(Workers):
         raise WorkersGone("a worker of the executor ended, and the executor takes no more work")
 
     def wait(self, seconds: float) -> list[Done]:
-        done = []
-        with contextlib.suppress(queue.Empty):
-            done.append(self._done.get(timeout=seconds))
-            while True:
-                done.append(self._done.get_nowait())
-        return done
+        return drained(self._done, seconds)
 
 
 class LocalProcesses(OnExecutor):

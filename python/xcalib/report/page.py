@@ -7,20 +7,19 @@ import json
 import operator
 import platform
 import shlex
-from importlib import resources
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from ..evaluation import evaluate
 from ..frames import write_bytes
 from .charts import chart, lens_lines, rig_segments
 from .pictures import frame_pictures
 from .run import Run
+from .template import rendered, text_of
 
 LARGEST = 5 * 10**6
 """Of a page [bytes]."""
@@ -33,20 +32,7 @@ def write_page(run: Run, path: Path, title: str) -> None:
 
 def page(run: Run, title: str) -> str:
     """The page of a run, as HTML."""
-    environment = Environment(
-        loader=FunctionLoader(text_of),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = number
-    return environment.get_template("page.html").render(facts_of(run, title))
-
-
-def text_of(name: str) -> str:
-    """A file beside this one."""
-    return resources.files(__package__).joinpath(name).read_text("utf-8")
+    return rendered(__package__, "page.html", facts_of(run, title))
 
 
 def facts_of(run: Run, title: str) -> dict[str, Any]:
@@ -102,8 +88,7 @@ def facts_of(run: Run, title: str) -> dict[str, Any]:
             "OpenCV": cv2.__version__,
             "machine": f"{platform.system()} {platform.machine()}",
         },
-        "style": text_of("style.css"),
-        "script": text_of("script.js"),
+        "script": text_of(__package__, "script.js"),
     }
 
 
@@ -130,10 +115,3 @@ def scores_of(run: Run) -> list[dict[str, Any]]:
         }
         for index, (after, before) in zip(run.chosen, found.frames, strict=True)
     ]
-
-
-def number(value: Any, digits: int = 3) -> str:
-    """A number in a few digits; a dash where there is none."""
-    if not isinstance(value, int | float) or not np.isfinite(value):
-        return "-"
-    return f"{value:.{digits}g}"

@@ -32,8 +32,6 @@ struct RowDelay {
     double at = 0.0, per_column = 0.0, per_row = 0.0;
 
     double operator()(double u, double v) const { return at + per_column * u + per_row * v; }
-    // The largest of an image of such a size.
-    double largest(int width, int height) const;
 };
 
 // Where no rig is known, both cameras look the same way, upright, and as far up and down.

@@ -84,16 +84,9 @@ class Picked : public Stream {
 // The stream itself where all its frames are picked, in order.
 StreamPointer picked(StreamPointer stream, const std::vector<int>& indices);
 
-// A stream whose frames are passed through a function as they are read.
-class Converted : public Stream {
+// The frames of another stream, read in another way.
+class Wrapped : public Stream {
    public:
-    using Convert = std::function<Picture(const Picture&, int index)>;
-
-    Converted(StreamPointer stream, Convert convert)
-        : stream_(std::move(stream)), convert_(std::move(convert)) {
-        times = stream_->times;
-        said = stream_->said;
-    }
     int size() const override { return stream_->size(); }
     std::string name(int index) const override { return stream_->name(index); }
     std::string where(int index) const override { return stream_->where(index); }
@@ -101,7 +94,21 @@ class Converted : public Stream {
     bool concurrent() const override { return stream_->concurrent(); }
 
    protected:
+    explicit Wrapped(StreamPointer stream) : stream_(std::move(stream)) {
+        times = stream_->times;
+        said = stream_->said;
+    }
+
     StreamPointer stream_;
+};
+
+// A stream whose frames are passed through a function as they are read.
+class Converted : public Wrapped {
+   public:
+    using Convert = std::function<Picture(const Picture&, int index)>;
+
+    Converted(StreamPointer stream, Convert convert)
+        : Wrapped(std::move(stream)), convert_(std::move(convert)) {}
 
    private:
     Picture read(int index) override { return convert_((*stream_)[index], index); }
